@@ -71,19 +71,28 @@ class Case:
         return path.read_text(encoding="utf-8")
 
 
+def thinned(log: Log, every: int = 5) -> Log:
+    """As a recorder keeps it: position and force of one instant, which the command is not."""
+    x = {name: column[::every] for name, column in log.axes["x"].columns.items()}
+    return Log(log.sample_rate / every, {"x": replace(log.axes["x"], columns=x)})
+
+
 @cache
 def cogging_case() -> Case:
-    """The drive with two short logs, diagnosed among two effects."""
+    """The drive with two short logs, diagnosed among two effects.
+
+    Its channel delay is seen when cogging is beside the model.
+    """
     catalogue = load_catalogue()
     effects = [("coulomb_viscous", {"Fc": 0.3, "Fs": 0.3, "sigma2": 0.5}), ("constant_force", {})]
     axis = AxisModel(
         5.0, HARDWARE, tuple(Fitted.at_start(catalogue[n], values) for n, values in effects)
     )
-    model = MachineModel("drive", {"x": axis}, 2000.0)
+    model = MachineModel("drive", {"x": axis}, 10_000.0)
     hidden = Fitted.at_start(catalogue["cogging"], {"p": 0.025, "a1": 0.1})
     truth = model.with_axis("x", axis.with_effect(hidden))
     first, second = (
-        simulate(truth, "tracking", seed=seed, duration=6.0, simulator=ReducedSimulator)
+        thinned(simulate(truth, "tracking", seed=seed, duration=6.0, simulator=ReducedSimulator))
         for seed in (1, 2)
     )
     fit, held = {"run 1": first}, {"run 2": second}

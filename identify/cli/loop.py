@@ -9,7 +9,7 @@ from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -35,6 +35,7 @@ from twin.errors import InputError
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
+    from identify.output.words.commands import Source
     from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
     from twin.effects import Catalogue
 
@@ -107,8 +108,8 @@ def compare(
     job = partial(workflow.compare, test_function=test_function)
     result, findings, silent = with_logs(job, machine, logs)
     if html:
-        again = _typed(model, test_function, effects)
-        _report(html, f"{machine.name}: model against measurement", again, None, result, findings)
+        source = _source(model, test_function, effects)
+        _report(html, f"{machine.name}: model against measurement", source, None, result, findings)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
     return said_of(result, [*findings, *silent], left_out=silent)
@@ -129,43 +130,46 @@ def diagnose(
     Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
     """
     from identify import workflow
+    from identify.output.as_json import answer_of
+    from identify.output.text import diagnose_text
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
     result, findings, silent = with_logs(job, machine, logs, holdout, test)
+    source = _source(model, test_function, effects)
     if html:
-        again, title = (
-            _typed(model, test_function, effects),
-            f"{machine.name}: what the model lacks",
-        )
-        _report(html, title, again, result, result.comparison, findings)
-    return said_of(result, [*findings, *silent], data_faults=findings, left_out=silent)
+        title = f"{machine.name}: what the model lacks"
+        _report(html, title, source, result, result.comparison, findings)
+    answer = answer_of(result, data_faults=findings, left_out=silent)
+    return Said(diagnose_text(result, source), answer, [*findings, *silent])
 
 
-def _typed(model: str, test_function: float | None, effects: list[Path] | None) -> dict[str, str]:
-    """The model, and the options as they are typed, that the next command needs as well."""
+def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
+    """The command as typed, and what the next one takes over of it."""
+    from identify.output.words.commands import Source
+
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
     own = [text for file in effects or () for text in ("--effects", str(file))]
-    return {"model": model, "options": shlex.join([*length, *own])}
+    return Source(shlex.join(["twin", *sys.argv[1:]]), model, options=shlex.join([*length, *own]))
 
 
 def _report(
     out: Path,
     title: str,
-    again: dict[str, Any],
+    source: Source,
     diagnosis: Diagnosis | None,
     comparison: Comparison,
     findings: Sequence[str],
 ) -> None:
-    """Write a report. again: what the next command needs as well. findings: on the logs."""
-    from identify.output.report import Source, write_report
+    """Write a report; findings: on the logs."""
+    from identify.output.report import write_report
 
     write_report(
         out, title=title, diagnosis=diagnosis, comparison=comparison,
         history=(diagnosis or comparison).model.history,
         assumed=[line for line in findings if "the import map assumes" in line],
         faults=[line for line in findings if ": error: " in line],
-        source=Source(shlex.join(["twin", *sys.argv[1:]]), **again),
+        source=source,
     )  # fmt: skip
 
 

@@ -252,6 +252,14 @@ class Errors:
         first = error_in(on, before, dataset)
         return cls(first, first if after is before else error_in(on, after, dataset), on)
 
+    def share_of(self, whole: float, floor: float) -> float:
+        """Part of the square of a whole error above a noise floor (N) by which this one falls.
+
+        Of this one before, where that is more: that of a fit without one finding may be.
+        """
+        above = max(whole, self.before) ** 2 - floor**2
+        return min((self.before**2 - self.after**2) / above, 1.0) if above > 0.0 else 0.0
+
 
 def error_in(role: Role, fit: Fit, dataset: Dataset) -> float:
     """RMS force error (N) on the logs of a role; no number where there are none."""

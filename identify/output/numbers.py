@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2", "N/s"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST = 0.5  # in its unit, of the largest value printed in it
+SHORTEST = 1e-3  # printed without a power of ten
 DIGITS = 3  # significant digits of a printed number
 NOTHING = "–"  # printed where there is no value
 RAISED = str.maketrans("+-0123456789", "⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -59,9 +60,13 @@ class Scale:
         half = (high - low) / self.size / 2.0
         if not (math.isfinite(half) and half > 0.0):
             return [number(v / self.size) for v in values]
-        decimals = max(1 - math.floor(math.log10(half)), 0)
+        largest = max(abs(v) / self.size for v in (low, high, *values))
+        power = math.floor(math.log10(largest)) if largest < SHORTEST else 0
+        decimals = max(1 - math.floor(math.log10(half)) + power, 0)
+        shown = (v / self.size / 10.0**power for v in values)
         # Adding zero turns a rounded minus zero into zero.
-        return [f"{round(v / self.size, decimals) + 0.0:.{decimals}f}" for v in values]
+        texts = (f"{round(v, decimals) + 0.0:.{decimals}f}" for v in shown)
+        return [f"{text}e{power:03d}" if power else text for text in texts]
 
 
 def quantity(value: float | None, unit: str) -> str:
@@ -98,7 +103,7 @@ def number(value: float, digits: int = DIGITS) -> str:
     if value == 0.0:
         return "0"
     magnitude = math.floor(math.log10(abs(value)))
-    if -4 <= magnitude < 7:
+    if abs(value) >= SHORTEST and magnitude < 7:
         return f"{value:.{max(digits - 1 - magnitude, 0)}f}"
     return f"{value:.{digits - 1}e}"
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity
 from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
+from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import (
     all_found,
     named_errors_in_words,
@@ -39,7 +41,7 @@ from identify.output.words.plan import (
     supposed_in_words,
 )
 from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
-from identify.results import text_of
+from identify.results import figure_of, html_of, text_of
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
 from identify.results.told import Told
@@ -50,6 +52,9 @@ from identify.validation.agreement import Agreement
 from identify.validation.comparison import AxisComparison
 from twin.experiments.file import in_short
 from twin.model.parameters import free_parameters, read
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are printed
 
@@ -70,8 +75,22 @@ def fit_text(result: FitResult) -> str:
 
 
 def _fitted(result: FitResult, axis: str, fit: Fit) -> Iterator[str]:
+    yield from fit_lines(result, axis)
+    found = result.estimates[axis]
+    common, hidden = common_reason(found), nonparametric_labels(fit.axis)
+    for e in found:
+        if e.label not in hidden:
+            value, interval = estimate_in_words(e, common)
+            tail = f"90 % in {interval}" if e.low is not None else interval
+            yield f"  {e.label:34s} {value:>16s}  {tail}".rstrip()
+    curves = (f for f in fit.axis.effects if f.effect.is_nonparametric)
+    yield from (f"  {nonparametric_in_words(f)}" for f in curves)
+
+
+def fit_lines(result: FitResult, axis: str) -> Iterator[str]:
+    """What is said of the fit of an axis before its parameters."""
+    fit, still = result.fits[axis], result.left_out[axis]
     unit, words = fit.axis.units.force, fit.axis.units.words
-    found, still = result.estimates[axis], result.left_out[axis]
     others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
     known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
     errors = (f"on the {role.value} logs {quantity(e, unit)}" for role, e in known.items())
@@ -86,16 +105,8 @@ def _fitted(result: FitResult, axis: str, fit: Fit) -> Iterator[str]:
         yield f"  not fitted on {', '.join(still)}, where axis {axis} stands still"
     if changed := refit_in_words(result.refits[axis]):
         yield f"  {changed}"
-    if common := common_reason(found):
+    if common := common_reason(result.estimates[axis]):
         yield f"  {no_interval_in_words(common)}"
-    hidden = nonparametric_labels(fit.axis)
-    for e in found:
-        if e.label not in hidden:
-            value, interval = estimate_in_words(e, common)
-            tail = f"90 % in {interval}" if e.low is not None else interval
-            yield f"  {e.label:34s} {value:>16s}  {tail}".rstrip()
-    curves = (f for f in fit.axis.effects if f.effect.is_nonparametric)
-    yield from (f"  {nonparametric_in_words(f)}" for f in curves)
 
 
 @text_of.register
@@ -143,8 +154,11 @@ def _position_error(c: AxisComparison, log: str) -> str:
 
 
 @text_of.register
-def diagnose_text(result: Diagnosis) -> str:
-    """The answer for each axis, its best candidates, and what else is said."""
+def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
+    """The answer for each axis, its best candidates, and what else is said.
+
+    source: what stands for MODEL in the next command.
+    """
     lines = []
     for axis, d in result.axes.items():
         said, words = said_of(result, axis), d.base.axis.units.words
@@ -155,13 +169,13 @@ def diagnose_text(result: Diagnosis) -> str:
         ]
         if d.tested.on is not Role.TRAINING:
             lines.append(f"  {named_errors_in_words(d)}")
-        lines += [f"  {tie}" for tie in said.ties]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         for first, *others in said.findings:
             lines += [f"  {first}", *(f"    {other}" for other in others)]
-        rest = (said.beside, said.shapes, said.left, said.advice, said.following)
+        rest = (said.beside, said.shapes, said.left, said.advice)
         lines += [f"  {sentence}" for sentences in rest for sentence in sentences]
+        lines += [f"  next: {source.filled(c, names_of(d.dataset))}" for c in said.commands]
         lines += _candidates(d)
         lines += [f"  {line}" for line in said.steps]
         lines += [f"  note: {note}" for note in said.notes]
@@ -185,9 +199,7 @@ def _candidates(found: AxisDiagnosis) -> Iterator[str]:
     """The best candidates, a line each."""
     shown = found.ranking[:SHOWN]
     if any(c.score for c in shown):
-        yield (
-            f"  candidates with their evidence (difference of BIC) and the {tested_on(found)} error"
-        )
+        yield f"  candidates with their evidence (difference of BIC) and the {tested_on(found)}"
     yield from (_candidate(c, found) for c in shown)
 
 
@@ -246,3 +258,27 @@ def agree_text(result: Agreement) -> str:
         lines += [f"  {cause}" for cause in causes_in_words(found)]
     lines += [f"axis {axis}: not compared, as it has no intervals" for axis in result.not_compared]
     return "\n".join(lines)
+
+
+# --- in a notebook, whose templates and pictures are loaded when they are asked for ----------
+
+
+@html_of.register
+def _parameters(result: FitResult) -> str:
+    from identify.output import notebook
+
+    return notebook.parameters(result, {axis: fit_lines(result, axis) for axis in result.fits})
+
+
+@html_of.register(Comparison | Diagnosis)
+def _tables(result: Comparison | Diagnosis) -> str:
+    from identify.output import notebook
+
+    return notebook.tables(result)
+
+
+@figure_of.register(Comparison | Diagnosis)
+def _picture(result: Comparison | Diagnosis, coordinate: str | None, axis: str | None) -> Figure:
+    from identify.output import notebook
+
+    return notebook.residual(result, coordinate, axis)

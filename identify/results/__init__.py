@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from twin.model.machine import MachineModel
 
 
@@ -15,8 +18,20 @@ def text_of(result: object) -> str:
     return repr(result)
 
 
+@singledispatch
+def html_of(result: object) -> str | None:
+    """A result as a piece of HTML; None of a kind that has none."""
+    return None
+
+
+@singledispatch
+def figure_of(result: object, coordinate: str | None, axis: str | None) -> Figure:
+    """The residual of an axis over a coordinate; the leading ones where None."""
+    raise TypeError(f"a {type(result).__name__} has no residual")
+
+
 class Printed:
-    """A result whose ``str`` is the text that its command prints."""
+    """A result whose ``str`` is the text that its command prints; in a notebook, tables."""
 
     model: MachineModel
 
@@ -25,3 +40,30 @@ class Printed:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.model.name}; print it to read it>"
+
+    def _repr_html_(self) -> str | None:
+        return html_of(self)
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The force residual of a result, to be drawn."""
+
+    of: object
+
+    def against(self, coordinate: str, axis: str | None = None) -> Figure:
+        """It over a coordinate, such as "position"; of the leading axis where none is named."""
+        return figure_of(self.of, coordinate, axis)
+
+
+class Pictured(Printed):
+    """A result with a residual."""
+
+    def plot(self, axis: str | None = None) -> Figure:
+        """The residual over the coordinate that the answer is about."""
+        return figure_of(self, None, axis)
+
+    @property
+    def residual(self) -> Residual:
+        """E.g. ``found.residual.against("position")``."""
+        return Residual(self)

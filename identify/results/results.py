@@ -11,7 +11,7 @@ from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
-from identify.results import Printed
+from identify.results import Pictured, Printed
 from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
@@ -85,7 +85,7 @@ class SimulationFit(Printed):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Printed):
+class Comparison(Pictured):
     """The errors of a model on logs, by axis."""
 
     model: MachineModel
@@ -93,7 +93,7 @@ class Comparison(Printed):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Printed):
+class Diagnosis(Pictured):
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
     model: with the values of the fit before anything was found. told: what is told of each axis.

@@ -12,8 +12,12 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.force_balance import effect_forces, residual
 from identify.estimation.residual_dependence import unit_of
 from identify.validation.misfit_maps import KNOWN_UNITS, coordinates
+from twin.errors import InputError
 from twin.model.machine import AxisModel
 from twin.signals import Array
+
+BINS = 80  # of a curve of means
+FEW = 4  # values, of which a mean is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +41,18 @@ class Signals:
     before: Array
     after: Array | None
     effects: Mapping[str, Array]
+
+    @property
+    def size(self) -> float:
+        """RMS of the force residual without what was found, N."""
+        return float(np.sqrt(np.nanmean(self.before**2)))
+
+    def over(self, coordinate: str) -> Array:
+        """A coordinate (n,); raises InputError for one that is not known."""
+        known = {"time": self.time, **self.coordinates}
+        if coordinate not in known:
+            raise InputError(f"unknown coordinate '{coordinate}'; known are {', '.join(known)}")
+        return known[coordinate]
 
 
 def signals_of(
@@ -63,3 +79,12 @@ def signals_of(
 
 def _left(axis: AxisModel, logs: tuple[PreparedLog, ...]) -> Array:
     return np.where(moving(logs, sticks(axis)), residual(axis, logs), np.nan)
+
+
+def means(x: Array, y: Array) -> tuple[Array, Array]:
+    """Middles of bins of x and the means of y in them, those that are known by a few values."""
+    known = np.isfinite(x) & np.isfinite(y)
+    count, edges = np.histogram(x[known], BINS)
+    sums, _ = np.histogram(x[known], BINS, weights=y[known])
+    middles = (edges[:-1] + edges[1:]) / 2.0
+    return middles, np.where(count >= FEW, sums / np.maximum(count, 1), np.nan)

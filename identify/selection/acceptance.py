@@ -95,7 +95,9 @@ class Score:
             if t < least:
                 return f"gain uncertain: t = {t:.1f}, where {least:.1f} is sure"
         if self.part <= self.control:
-            return f"its controls take {100.0 * self.control:.0f} %"
+            return (
+                f"shifted in time, where it cannot be real, it takes {100.0 * self.control:.0f} %"
+            )
         return None
 
     @property

@@ -13,7 +13,12 @@ from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
-from identify.selection.findings import Finding, FindingKind, findings_of, without_law
+from identify.selection.findings import (
+    Finding,
+    FindingKind,
+    findings_of,
+    without_law,
+)
 from identify.selection.search import Found, Step, Tried, is_level, search
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -87,6 +92,16 @@ class AxisDiagnosis:
     def chosen(self) -> Errors:
         """The same errors on the logs that chose."""
         return Errors.of(self.base, self.final, self.dataset, self.dataset.chosen_on)
+
+    @property
+    def explained(self) -> float:
+        """Part of the squared error above the noise floor that all findings together remove."""
+        return self.tested.share_of(self.tested.before, self.base.floor)
+
+    @property
+    def in_part(self) -> bool:
+        """Whether the logs were so long that their beginnings were searched."""
+        return any(len(c.fit.kept) < len(self.base.kept) for c in self.ranking)
 
     @property
     def best(self) -> Candidate | None:

@@ -135,6 +135,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     alone = noise or any(step.held for step in steps)  # then the others tell nothing against it
     beside = own if alone else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
+    whole = error_in(tested.on, found.base.fit, dataset)
     name = steps[0].change.name
     # A free curve may have taken the place of the law, which is then as it was before.
     fits = (final.fit, less.fit, *(s.tried.judged.fit for s in steps))
@@ -145,7 +146,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     finding = Finding(
         effect=name,
         tied=tuple(dict.fromkeys(other for other in tied if other != name)),
-        explains=share_explained(tested, found.base.fit, dataset),
+        explains=tested.share_of(whole, found.base.fit.floor),
         tested=tested,
         chosen=chosen,
         unit=axis.units.force,
@@ -193,13 +194,3 @@ def _errors(before: Fit, after: Fit, dataset: Dataset) -> tuple[Errors, Errors]:
     """On the logs that chose, and on test logs; without these the first twice."""
     chosen = Errors.of(before, after, dataset, dataset.chosen_on)
     return chosen, Errors.of(before, after, dataset, Role.TEST) if dataset.test else chosen
-
-
-def share_explained(errors: Errors, base: Fit, dataset: Dataset) -> float:
-    """Part of the squared error above the noise floor by which an error falls.
-
-    Of the base's, or of the error before where the fit without one finding leaves more.
-    """
-    above = max(error_in(errors.on, base, dataset), errors.before) ** 2 - base.floor**2
-    taken = errors.before**2 - errors.after**2
-    return min(taken / above, 1.0) if above > 0.0 else 0.0

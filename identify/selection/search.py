@@ -178,10 +178,8 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         fit = fit_multistart(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
         judged = _settled(Judged(fit, dataset))
-    first = (
-        first if first.dataset is judged.dataset else _refitted_on(first.fit.axis, first, judged)
-    )
-    return Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+    found = Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+    return found if first.dataset is judged.dataset else _told_on(judged, found)
 
 
 def _with_free_exponents(
@@ -219,6 +217,37 @@ def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
     """An axis fitted to the dataset of a judged fit."""
     dataset = judged.dataset
     return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
+
+
+def _told_on(final: Judged, found: Found) -> Found:
+    """What was found, told on the dataset of the final fit, whose channel delay is another.
+
+    So that the error without anything is one number, beside every candidate and in the answer. What
+    was decided, and by which score, stays.
+    """
+    dataset = final.dataset
+
+    def there(fit: Fit) -> Judged:
+        one = Judged(fit, dataset)
+        return one if fit.logs is dataset.fit else _refitted_on(fit.axis, one, final)
+
+    first = there(found.base.fit)
+
+    def told(one: Candidate) -> Candidate:
+        if one.is_noise or one.score is None:
+            left, error = np.sqrt(one.gain.left), first.other_error
+            return replace(one, gain=replace(one.gain, before=error, after=left * error))
+        by = candidate_of(first, there(one.fit), one.effect, ())
+        return replace(one, fit=by.fit, evidence=by.evidence, gain=by.gain)
+
+    ranking = {id(one): told(one) for one in found.ranking}
+
+    def same(step: Step) -> Step:
+        own = step.tried.candidate
+        return replace(step, tried=replace(step.tried, candidate=ranking.get(id(own), own)))
+
+    steps, passed = (tuple(map(same, each)) for each in (found.steps, found.passed))
+    return replace(found, base=first, ranking=tuple(ranking.values()), steps=steps, passed=passed)
 
 
 def tried_beside(

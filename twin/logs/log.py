@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +95,23 @@ class Log:
         axes = "; ".join(f"{name}: {', '.join(a.columns)}" for name, a in self.axes.items())
         seconds = len(self) * self.period
         return f"<Log of {seconds:.4g} s at {self.sample_rate:g} Hz, {axes or 'no axes'}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the range of each signal."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(signal)}</td>"
+            f"<td>{escape(axis.units.get(signal, ''))}</td>"
+            f"<td>{np.fmin.reduce(c):.4g}</td><td>{np.fmax.reduce(c):.4g}</td></tr>\n"
+            for name, axis in self.axes.items()
+            for signal, c in axis.columns.items()
+            if len(c)
+        )
+        titles = "".join(f"<th>{t}</th>" for t in ("axis", "signal", "unit", "least", "most"))
+        seconds = len(self) * self.period
+        return (
+            f"<p>{seconds:.4g} s at {self.sample_rate:g} Hz</p>\n<table>\n<tr>{titles}</tr>\n"
+            f"{rows}</table>"
+        )
 
     def part(self, first: int, stop: int) -> Log:
         """Its samples from number ``first`` to before ``stop``."""

@@ -17,7 +17,7 @@ from identify.output.words.diagnosis import (
     said_of,
     why_not,
 )
-from identify.output.words.findings import advice, together_in_words
+from identify.output.words.findings import advice, pairs_in_words
 from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis
@@ -323,6 +323,8 @@ class DiagnosisEntry(Entry):
     missing: list[str] = read("named")
     ambiguous_with: list[str]
     findings: list[FindingEntry]
+    explained: Number
+    """Part of the squared error above the noise floor that all findings together remove."""
     needed_together: list[str]
     also_seen: list[str] = read("small")
     unexplained: DependenceEntry | None
@@ -374,7 +376,7 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
         verdict=d.verdict.name.lower(),
         explanation=said.verdict,
         effect=d.best.effect.name if d.best else None,
-        needed_together=together_in_words(d),
+        needed_together=pairs_in_words(d),
         remainder=_remainder(d, result.left_over.get(axis)),
         ranking=[CandidateEntry.of(c, **_candidate(c, d)) for c in d.ranking],
         steps=[_step(d, i) for i in range(len(d.steps))],

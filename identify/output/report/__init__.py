@@ -13,7 +13,8 @@ from identify.output.report import answer, effects, residual
 from identify.output.report.explorer import explored
 from identify.output.report.page import Answer, Block, Heading, Part, Section
 from identify.output.report.page import page as whole_page
-from identify.output.report.subject import Source, Subject
+from identify.output.report.subject import Subject
+from identify.output.words.commands import Source
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically

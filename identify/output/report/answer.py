@@ -2,127 +2,75 @@
 
 from __future__ import annotations
 
-import re
-
 from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.addition import also_chose_in_words, errors_of_step, proved_in_words
-from identify.output.words.diagnosis import Said, tested_on, why_not
+from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
 from identify.results.addition import Addition
+from identify.results.results import Diagnosis
 from identify.results.told import Told
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.model.machine import HistoryStep
 
-ADD = re.compile(r"twin add (--shape )?\w+")
-
 
 def cards(view: AxisView) -> list[Block]:
     """The card of an axis; before it, where nothing was diagnosed, one for its latest addition."""
-    if view.found and view.told and view.said:
-        return [_diagnosed(view, view.found, view.told, view.said)]
+    diagnosis = view.subject.diagnosis
+    if diagnosis and view.found and view.told and view.said:
+        return [_diagnosed(view, diagnosis, view.found, view.told, view.said)]
     added = [a for a in view.subject.additions if a.step.axis == view.name]
     return [*(_added(a) for a in added[-1:]), _compared(view)]
 
 
-def _diagnosed(view: AxisView, found: AxisDiagnosis, told: Told, said: Said) -> Answer:
-    return Answer(
-        headline=f"Axis {view.name}: {said.headline}",
-        sentence=" ".join((said.verdict, *said.left)),
-        tiles=_tiles(view, found, told),
-        remarks=_remarks(view, found, said),
-        tone=Tone.PLAIN if found.verdict is Verdict.NOTHING_MISSING else Tone.STRONG,
-        commands=[view.subject.command(text) for text in _following(found, said)],
-    )
-
-
-def _following(found: AxisDiagnosis, said: Said) -> list[str]:
-    """The next step as commands, of model and logs that are still to be named."""
-    if found.verdict is Verdict.NOTHING_MISSING:
-        return []
-    for finding in found.missing:
-        if finding.tied:
-            between = f"{finding.effect} {finding.tied[0]}"
-            return [f"twin plan MODEL LOG... --between {between} -o next.toml"]
-        if finding.together:
-            second = f"twin add {finding.together[0]} first.toml LOG... -o both.toml"
-            return [f"twin add {finding.effect} MODEL LOG... -o first.toml", second]
-    asked = (ADD.search(text) for text in (*said.following, *said.advice))
-    return [f"{m[0]} MODEL LOG... -o better.toml" for m in asked if m][:1]
-
-
-def _remarks(view: AxisView, found: AxisDiagnosis, said: Said) -> list[str]:
-    """What each finding explains, what else was seen, and what to do next."""
-    diagnosis = view.subject.diagnosis
-    plan = diagnosis and diagnosis.next_experiments.get(view.name)
-    refit = diagnosis and diagnosis.refits.get(view.name)
+def _diagnosed(
+    view: AxisView, diagnosis: Diagnosis, found: AxisDiagnosis, told: Told, said: Said
+) -> Answer:
     quiet = found.verdict is Verdict.NOTHING_MISSING
-    every = (
+    plan, refit = diagnosis.next_experiments.get(view.name), diagnosis.refits.get(view.name)
+    remarks = (
         *(spaced(". ".join(sentences)) for sentences in said.findings),
         *said.beside,
-        _runner_up(found),
         plan and next_step_in_words(plan),
         refit_in_words(refit) if quiet and refit else None,
         *said.advice,
     )
-    return [capitalised(text) for text in every if text]
-
-
-def _runner_up(found: AxisDiagnosis) -> str | None:
-    second = next((c for c in found.ranking if c.score and c.effect.name not in found.named), None)
-    if second is None:
-        return None
-    errors = arrow(second.gain.before, second.gain.after, found.dataset.units.force)
-    role = "Runner-up" if found.best else "Nearest candidate"
-    return (
-        f"{role}: {spaced(second.effect.name)}, evidence (difference of BIC) "
-        f"{number(second.delta_bic)}, {tested_on(found)} error {errors}, "
-        f"{why_not(found, second) or 'proved too'}"
+    return Answer(
+        headline=f"Axis {view.name}: {said.headline}",
+        sentence=" ".join((said.verdict, *said.left)),
+        tiles=_tiles(view, found, told),
+        remarks=[capitalised(text) for text in remarks if text],
+        tone=Tone.PLAIN if quiet else Tone.STRONG,
+        commands=[view.subject.command(text) for text in said.commands],
     )
 
 
 def _tiles(view: AxisView, found: AxisDiagnosis, told: Told) -> list[Tile]:
+    """The errors without and with what was found, on the logs of each role."""
     base, final, floor, unit = found.base, found.final, told.floor, view.units.force
-    if final is base:
-        tested = told.tested
-        test = Tile(view.words("Force error, test logs"), quantity(tested.before, unit), "RMS")
-        on_test = [test] if tested.on is Role.TEST else []
-        return [*_error_tiles(view, base.error, floor), *on_test, *_position_tile(view, "")]
-    named = f"with {view.label}"
-    tiles = [_fall(view, "training logs", base.error, final.error, f"{named}, RMS")]
+    errors = {f"{Role.TRAINING.value} logs": (base.error, final.error)}
     if found.dataset.holdout:
-        chosen = told.chosen
-        tiles.append(_fall(view, "selection logs", chosen.before, chosen.after, f"{named}, RMS"))
+        errors["selection logs"] = (told.chosen.before, told.chosen.after)
     elif found.best is not None and len(found.named) == 1:
-        gain = found.best.gain
-        t = f"t = {number(gain.t)} over blocks"
-        tiles.append(_fall(view, "cross-validated", gain.before, gain.after, t))
+        errors[tested_on(found).split()[0]] = (found.best.gain.before, found.best.gain.after)
     if told.tested.on is Role.TEST:
-        before, after = told.tested.before, told.tested.after
-        tiles.append(_fall(view, "test logs", before, after, f"{named}, RMS"))
-    of_noise = f"training logs; floor {quantity(floor, unit)} RMS"
-    ratio = arrow(base.error / floor, final.error / floor, "1")
-    return [
-        *tiles,
-        Tile("Error over noise floor", ratio, of_noise),
-        *_position_tile(view, f", without {view.label}"),
+        errors["test logs"] = (told.tested.before, told.tested.after)
+    remark = f"with {view.label}, RMS" if view.label else "RMS"
+    tiles = [
+        Tile(view.words(f"Force error, {on}"), _fall(*pair, unit), remark)
+        for on, pair in errors.items()
     ]
+    ratio, of = _fall(base.error / floor, final.error / floor, "1"), f"{quantity(floor, unit)} RMS"
+    tiles.append(Tile("Error over noise floor", ratio, f"training logs; floor {of}"))
+    return [*tiles, *_position_tile(view, f", without {view.label}" if view.label else "")]
 
 
-def _fall(view: AxisView, on: str, before: float, after: float, remark: str) -> Tile:
-    return Tile(view.words(f"Force error, {on}"), arrow(before, after, view.units.force), remark)
-
-
-def _error_tiles(view: AxisView, error: float, floor: float) -> list[Tile]:
-    unit = view.units.force
-    return [
-        Tile(view.words("Force error"), quantity(error, unit), "RMS over the logs"),
-        Tile("Error over noise floor", number(error / floor), f"floor {quantity(floor, unit)} RMS"),
-    ]
+def _fall(before: float, after: float, unit: str) -> str:
+    return quantity(before, unit) if after == before else arrow(before, after, unit)
 
 
 def _position_tile(view: AxisView, model: str) -> list[Tile]:
@@ -133,23 +81,27 @@ def _position_tile(view: AxisView, model: str) -> list[Tile]:
 
 
 def _compared(view: AxisView) -> Answer:
-    axis, at_floor = view.axis, view.axis.ratio < RULE.at_floor
-    headline = f"force error {number(axis.ratio)} times the noise floor"
-    sentence = "The force error is at its noise floor."
-    if not at_floor:
-        sentence = (
-            "The force error is larger than noise explains; twin diagnose finds which effect is "
-            "missing."
-        )
-    following = [] if at_floor else ["twin diagnose MODEL LOG... -o diagnosis.html"]
+    axis, unit = view.axis, view.units.force
+    at_floor, ratio = axis.ratio < RULE.at_floor, number(axis.ratio)
+    if at_floor:
+        headline, sentence = "the model explains the measurement", "is at its noise floor."
+    else:
+        headline = view.words(f"force error {ratio} times the noise floor")
+        sentence = "is larger than noise explains; twin diagnose finds which effect is missing."
+    error, floor = quantity(axis.total_error, unit), quantity(axis.floor, unit)
     return Answer(
-        headline=f"Axis {view.name}: "
-        + ("the model explains the measurement" if at_floor else view.words(headline)),
-        sentence=view.words(sentence),
-        tiles=[*_error_tiles(view, axis.total_error, axis.floor), *_position_tile(view, "")],
+        headline=f"Axis {view.name}: {headline}",
+        sentence=view.words(f"The force error {sentence}"),
+        tiles=[
+            Tile(view.words("Force error"), error, "RMS over the logs"),
+            Tile("Error over noise floor", ratio, f"floor {floor} RMS"),
+            *_position_tile(view, ""),
+        ],
         remarks=[],
         tone=Tone.PLAIN if at_floor else Tone.STRONG,
-        commands=[view.subject.command(text) for text in following],
+        commands=[]
+        if at_floor
+        else [view.subject.command("twin diagnose MODEL LOG... -o diagnosis.html")],
     )
 
 

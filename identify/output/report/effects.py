@@ -75,7 +75,7 @@ def found(view: AxisView) -> list[Block]:
     ]  # fmt: skip
     if len(findings) > 1:
         every = (scale.text(tested.before), scale.text(tested.after))
-        rows.append(Row(("All together", *every, percent(together(view)), *[NOTHING] * 3)))
+        rows.append(Row(("All together", *every, percent(view.found.explained), *[NOTHING] * 3)))
     titles = (
         "Error without it", "Error with all", "Share of squared error",
         "Of the logs that decided", "Shifted in time, at most", "Such answers right",
@@ -83,19 +83,10 @@ def found(view: AxisView) -> list[Block]:
     columns = (Column("Effect"), *(Column(title, numeric=True) for title in titles))
     caption = (
         f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
-        "others refitted: they can stand in for it, so the shares need not sum to that of all "
-        "together. The same force shifted in time cannot be real. Such answers were right in the "
-        "self-test."
+        "others refitted, which can stand in for it: the shares need not add up. The same force "
+        "shifted in time cannot be real. Right: of answers in the self-test."
     )
     return [Table(columns, rows, view.words(caption))]
-
-
-def together(view: AxisView) -> float:
-    """Part of the squared error above the noise floor that all findings together remove."""
-    assert view.found is not None
-    tested, floor = view.found.tested, view.floors.get(view.found.tested.on, view.axis.floor)
-    above = tested.before**2 - floor**2
-    return min((tested.before**2 - tested.after**2) / above, 1.0) if above > 0.0 else 0.0
 
 
 # --- the shape of a law, and curves without physics ------------------------------------------
@@ -177,9 +168,9 @@ def ranking_table(found: AxisDiagnosis) -> Table:
         Column("Values"),
     )  # fmt: skip
     caption = (
-        f"Evidence: difference of BIC. Error: RMS force, {tested_on(found)}. Part removed: of the "
-        "squared error above the noise floor, on the training logs or on data left out of the fit, "
-        "whichever is less."
+        f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
+        f"BIC. Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the "
+        "noise floor, on the training logs or on data left out of the fit, whichever is less."
     )
     return Table(columns, rows, units.words(caption))
 
@@ -308,6 +299,22 @@ def given_table(axis: AxisModel) -> Table:
     rows = [Row((k, value, meanings[k])) for k, value in values.items() if k not in hidden]
     columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
     return Table(columns, rows, "Values of the given model; twin fit adds intervals.")
+
+
+def fit_table(axis: AxisModel, known: Sequence[Estimate]) -> Table:
+    """Values of a fit with their intervals."""
+    meanings, hidden = _meanings(axis), nonparametric_labels(axis)
+    common = common_reason(known)
+    rows = [
+        Row((e.label, *estimate_in_words(e, common), meanings.get(e.label, "")))
+        for e in known
+        if e.label not in hidden
+    ]
+    columns = (
+        Column("Parameter"), Column("Value", numeric=True), Column("90 % interval"),
+        Column("Meaning"),
+    )  # fmt: skip
+    return Table(columns, rows)
 
 
 def _fitted(found: AxisDiagnosis, told: Told, label: str) -> Table:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from identify.output.numbers import Scale, spaced, title_case
 from identify.output.report.subject import AxisView, Subject
 from identify.results.signals import Signals
-from identify.selection.diagnosis import AxisDiagnosis
 from twin.curve import Coordinate
 from twin.effect import Effect
 from twin.model.units import units_of
@@ -32,7 +31,7 @@ NAMES = {"velocity": "Speed", "distance_since_reversal": "Distance since reversa
 def explored(subject: Subject) -> list[dict[str, Any]]:
     """The signals of all axes, the leading one first."""
     views = [view for view in subject.views if np.isfinite(view.signals.before).any()]
-    most = MOST_VALUES // max(sum(len(_named(view)) for view in views), 1)
+    most = MOST_VALUES // max(sum(len(named_signals(view)) for view in views), 1)
     return [_axis(view, most) for view in views]
 
 
@@ -44,7 +43,7 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
     kept = np.searchsorted(index, [*begins, ends[-1]])
     residuals = ["before", *(["after"] if signals.after is not None else [])]
     coordinates = [n for n in signals.coordinates if n not in UNSUITED]
-    left = Scale.of(view.units.force, [3.0 * _rms(signals.before)])
+    left = Scale.of(view.units.force, [3.0 * signals.size])
     return {
         "name": view.name,
         "every": every,
@@ -64,7 +63,7 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
         "signals": [
             {"name": name, "label": text, "unit": scale.unit, "size": scale.size,
              **_coded(values[index])}
-            for name, (text, values, scale) in _named(view, left).items()
+            for name, (text, values, scale) in named_signals(view, left).items()
         ],
         "coordinates": coordinates,
         "residuals": residuals,
@@ -81,7 +80,7 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _named(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Array, Scale]]:
+def named_signals(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Array, Scale]]:
     """Every signal of a page by its name there: what it is called, its values, and the unit."""
     signals, units, words = view.signals, view.units, view.words
     left = left or Scale.of(units.force, [])
@@ -89,7 +88,7 @@ def _named(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Ar
     without = f"error without {view.label}" if view.label else words("unexplained force")
     named = {
         "to_explain": (
-            words("measured force minus mass x acceleration"),
+            words(TO_EXPLAIN.replace("mass", units.mass_name)),
             signals.to_explain,
             force,
         ),
@@ -106,25 +105,18 @@ def _named(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Ar
     return named
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
-
-
 def coordinate_of_answer(view: AxisView, known: Sequence[str]) -> str:
-    """The coordinate that the answer is about, else that over which the error is least even."""
+    """The coordinate that the answer is about, else that of the worst region."""
     found = view.found
-    effects = [found.final.axis[n].effect for n in _of_model(found)] if found else []
-    asked = [_of_effect(effect) for effect in effects]
+    named = [f.effect for f in found.findings] if found else []
+    effects = (
+        [f.effect for f in found.final.axis.effects if f.effect.name in named] if found else []
+    )
+    asked = [_of_effect(effect) for effect in sorted(effects, key=lambda e: named.index(e.name))]
     asked += [found.unexplained.depends_on] if found and found.unexplained else []
     others = any(effect.reads_other_axis for effect in effects)
-    own = [m for m in view.axis.maps if others or not m.coordinate.startswith(OTHER)]
-    uneven = {m.coordinate: float(np.maximum(m.share - m.visited, 0.0).sum()) for m in own}
-    asked += sorted(uneven, key=lambda name: -uneven[name])
+    asked += [r.coordinate for r in view.axis.worst if others or not r.coordinate.startswith(OTHER)]
     return next((name for name in asked if name in known or name == "time"), known[0])
-
-
-def _of_model(found: AxisDiagnosis) -> list[str]:
-    return [f.effect for f in found.findings if f.effect in found.final.axis.names]
 
 
 def _of_effect(effect: Effect) -> str:

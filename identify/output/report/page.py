@@ -201,6 +201,27 @@ def page(
     facts: under the title. signals: of each axis, to be explored beside the first section. origin:
     in the footer, what the page was made of.
     """
+    return (
+        _templates()
+        .get_template("report.html.j2")
+        .render(
+            title=title,
+            facts=facts,
+            sections=shown,
+            signals=signals,
+            drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),
+            origin=[("proton-twin", importlib.metadata.version("proton-twin")), *origin],
+        )
+    )
+
+
+def fragment(blocks: Sequence[Block]) -> str:
+    """Blocks as HTML within another page, which has no script of ours."""
+    macros = _templates().get_template("blocks.html.j2").module
+    return "".join(getattr(macros, "brief" if b.macro == "answer" else b.macro)(b) for b in blocks)
+
+
+def _templates() -> Environment:
     environment = Environment(
         loader=PackageLoader("identify.output.report", "."),
         autoescape=True,
@@ -209,11 +230,4 @@ def page(
         lstrip_blocks=True,
     )
     environment.filters.update(typeset=typeset)
-    return environment.get_template("report.html.j2").render(
-        title=title,
-        facts=facts,
-        sections=shown,
-        signals=signals,
-        drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),
-        origin=[("proton-twin", importlib.metadata.version("proton-twin")), *origin],
-    )
+    return environment

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Fit
+from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
@@ -19,19 +18,6 @@ from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.units import AxisUnits
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a report was made of: the command as typed, the model's name in it, the logs' folder.
-
-    options: those of the command that the next one needs as well.
-    """
-
-    command: str = ""
-    model: str = "MODEL"
-    folder: Path = Path()
-    options: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,34 +30,22 @@ class Subject:
     history: Sequence[HistoryStep]
     additions: Sequence[Addition]
     assumed: Sequence[str] = ()
-    source: Source = Source()
+    source: Source = UNKNOWN
     faults: Sequence[str] = ()
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:
         """Names of the logs by role; those of a comparison alone are given as training logs."""
         compared = (log.motion.name for a in self.comparison.axes.values() for log in a.logs)
-        named = {Role.TRAINING: list(dict.fromkeys(compared))}
-        for role in (Role.SELECTION, Role.TEST):
-            diagnosed = self.diagnosis.axes.values() if self.diagnosis else ()
-            others = (log.motion.name for d in diagnosed for log in d.dataset.having(role))
-            named[role] = list(dict.fromkeys(others))
-        return named
+        named = {Role.TRAINING: [*compared], Role.SELECTION: [], Role.TEST: []}
+        for d in self.diagnosis.axes.values() if self.diagnosis else ():
+            for role, names in names_of(d.dataset).items():
+                named[role] += names
+        return {role: list(dict.fromkeys(names)) for role, names in named.items()}
 
     def command(self, text: str) -> str:
-        """A command with the model and the logs of this page in the place of MODEL and LOG...
-
-        A plan reads no test logs.
-        """
-        options = {Role.TRAINING: "", Role.SELECTION: "--holdout ", Role.TEST: "--test "}
-        given = [
-            f"{options[role]}{shlex.quote(name)}"
-            for role, names in self.logs.items()
-            for name in names
-            if role is not Role.TEST or not text.startswith("twin plan")
-        ]
-        every = " ".join([*given, *([self.source.options] if self.source.options else [])])
-        return text.replace("LOG...", every).replace("MODEL", shlex.quote(self.source.model))
+        """A command with the model and the logs of this page in the place of MODEL and LOG..."""
+        return self.source.filled(text, self.logs)
 
     @cached_property
     def views(self) -> list[AxisView]:

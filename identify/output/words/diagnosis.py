@@ -5,23 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from identify.estimation.fit import Outcome
-from identify.output.numbers import (
-    arrow,
-    capitalised,
-    change,
-    listed,
-    quantity,
-    spaced,
-)
+from identify.output.numbers import arrow, capitalised, change, listed, quantity, spaced
 from identify.output.words.addition import also_chose_in_words
+from identify.output.words.commands import next_commands
 from identify.output.words.findings import (
-    SHARES,
     advice,
+    all_in_words,
     finding_in_words,
-    next_command,
-    remainder_in_words,
+    left_in_words,
     shape_in_words,
-    together_in_words,
 )
 from identify.output.words.fit import (
     OUTCOMES,
@@ -30,7 +22,7 @@ from identify.output.words.fit import (
     prepared_in_words,
     refit_in_words,
 )
-from identify.output.words.residual import dependence_in_words, region_in_words, repeat_in_words
+from identify.output.words.residual import dependence_in_words, repeat_in_words, worst_in_words
 from identify.results.results import Diagnosis
 from identify.results.told import Told
 from identify.rules import RULE
@@ -46,21 +38,20 @@ from twin.model.units import units_of
 class Said:
     """All sentences about the diagnosis of one axis.
 
-    headline: the answer in a few words, with spaces in names. verdict: in a sentence. ties: what
-    the data cannot separate. findings: several sentences each. beside: on all findings together.
-    shapes: of laws. left: what remains and on what it depends. advice: where no law explains it.
-    following: the next command. steps: the way to the answer. notes: what else to know.
+    headline: the answer in a few words, with spaces in names. verdict: in a sentence. findings:
+    several sentences each. beside: on all findings together. shapes: of laws. left: what remains
+    and on what it depends. advice: where no law explains it. commands: what to run next, of MODEL
+    and LOG... steps: the way to the answer. notes: what else to know.
     """
 
     headline: str
     verdict: str
-    ties: tuple[str, ...]
     findings: tuple[tuple[str, ...], ...]
     beside: tuple[str, ...]
     shapes: tuple[str, ...]
     left: tuple[str, ...]
     advice: tuple[str, ...]
-    following: tuple[str, ...]
+    commands: tuple[str, ...]
     steps: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -69,26 +60,23 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     """The sentences about one axis of a diagnosis."""
     found, region = result.axes[axis], result.left_over.get(axis)
     words = found.base.axis.units.words
-    left = [capitalised(remains)] if (remains := remainder_in_words(found)) else []
+    left = left_in_words(found, result.told[axis].floor)
     if found.unexplained:
         left.append(dependence_in_words(found.unexplained))
-        if region:
-            left.append(f"It is largest at {words(region_in_words(region))}.")
-    beside = [SHARES] if len(found.findings) > 1 else []
-    beside += together_in_words(found)
+        left += [words(worst_in_words(region))] if region else []
+    beside = all_in_words(found)
     if found.small:
         beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
     advised = found.unexplained or any(f.shape for f in found.findings)
     return Said(
         headline=headline_in_words(found),
         verdict=words(verdict_in_words(found)),
-        ties=tuple(ties_in_words(found)),
         findings=tuple(finding_in_words(f) for f in found.findings),
         beside=tuple(beside),
         shapes=tuple(shape_in_words(f.effect, f.shape) for f in found.findings if f.shape),
         left=tuple(left),
         advice=(advice(found.findings),) if advised else (),
-        following=tuple(next_command(found)),
+        commands=tuple(next_commands(found)),
         steps=tuple(step_lines(found)),
         notes=remarks_on(result, axis),
     )
@@ -105,22 +93,34 @@ VERDICTS = {
         "The error is above the noise floor, and no effect of the catalogue explains it."
     ),
 }
-SEVERAL = "Several effects explain the error equally well; these data cannot separate them."
 
 
 def verdict_in_words(found: AxisDiagnosis) -> str:
-    """The answer of a diagnosis."""
-    against = f" {capitalised(but)}" if (but := not_confirmed_in_words(found)) else ""
-    if any(f.tied for f in found.findings):
-        return f"{SEVERAL}{against}"
-    if found.verdict is not Verdict.MISSING_EFFECTS:
-        return f"{VERDICTS[found.verdict]}{against}"
+    """The answer of a diagnosis, what the logs cannot separate, and what test logs contradict."""
+    said = [VERDICTS.get(found.verdict) or _proved(found)]
+    said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
+    said += [capitalised(against)] if (against := not_confirmed_in_words(found)) else []
+    return " ".join(said)
+
+
+def _proved(found: AxisDiagnosis) -> str:
     lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
     if found.dataset.holdout:
-        proved = f"the training logs and the selection logs prove {them}"
-    else:
-        proved = f"the training logs prove {them}, block by block; there is no selection log"
-    return f"The model lacks {lacks}: {proved}.{against}"
+        return f"The model lacks {lacks}: the training logs and the selection logs prove {them}."
+    return (
+        f"The model lacks {lacks}: the training logs prove {them}, block by block; there is no "
+        "selection log."
+    )
+
+
+def _ties(found: AxisDiagnosis) -> str:
+    """E.g. "cogging from wear, or lugre from gms", each pair once."""
+    ties = {f.effect: f.tied for f in found.findings}
+    said: list[str] = []
+    for name, alike in ties.items():
+        if {*alike} - {other for other in said if name in ties[other]}:
+            said.append(name)
+    return ", or ".join(f"{name} from {' or '.join(ties[name])}" for name in said)
 
 
 def headline_in_words(found: AxisDiagnosis) -> str:
@@ -165,17 +165,8 @@ def all_found(found: AxisDiagnosis) -> str:
 
 def tested_on(found: AxisDiagnosis) -> str:
     """What the error is called by which a candidate was judged."""
-    return "selection" if found.dataset.holdout else "cross-validated"
-
-
-def ties_in_words(found: AxisDiagnosis) -> list[str]:
-    """What these data cannot separate, one sentence a named effect, each pair once."""
-    ties = {f.effect: f.tied for f in found.findings}
-    said: list[str] = []
-    for name, alike in ties.items():
-        if {*alike} - {other for other in said if name in ties[other]}:
-            said.append(name)
-    return [f"these data cannot separate {name} from: {', '.join(ties[name])}" for name in said]
+    kind = "selection error" if found.dataset.holdout else "cross-validated error"
+    return f"{kind} of the beginnings, which were searched" if found.in_part else kind
 
 
 def named_errors_in_words(found: AxisDiagnosis) -> str:
@@ -200,8 +191,13 @@ def model_change_in_words(change: ModelChange) -> str:
 
 
 def step_lines(found: AxisDiagnosis) -> list[str]:
-    """What each accepted change did to the error, and why it is not named where it is not."""
-    lines = []
+    """What each accepted change did to the error, and why it is not named where it is not.
+
+    Nothing of a single one that is named: its line among the candidates says it.
+    """
+    lines: list[str] = []
+    if len(found.steps) == 1 and found.steps[0].tried.candidate is found.best:
+        return lines
     for i, step in enumerate(found.steps):
         candidate, what = step.tried.candidate, model_change_in_words(step.change)
         if candidate.is_noise:
@@ -212,7 +208,7 @@ def step_lines(found: AxisDiagnosis) -> list[str]:
         why = not_named_in_words(found, i)
         before, after = change(gain.before, gain.after, unit)
         lines.append(
-            f"step {i + 1}: with {what} the {tested_on(found)} error falls from {before} to "
+            f"step {i + 1}: with {what} the {tested_on(found)} falls from {before} to "
             f"{after}{dropped}{f'; not named: {why}' if why else ''}"
         )
     return lines
@@ -243,8 +239,8 @@ def why_not(found: AxisDiagnosis, candidate: Candidate) -> str:
 # --- notes beside the answer ------------------------------------------------------------------
 
 NO_SELECTION_LOG = (
-    "there is no selection log, so candidates were judged by cross-validation on blocks of the "
-    "training logs, which is a weaker test. Give --holdout a log of another experiment."
+    "there is no selection log, so candidates were judged on blocks of the training logs that were "
+    "left out of the fit, which is a weaker test. Give --holdout a log of another experiment"
 )
 
 
@@ -268,9 +264,8 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
         every.append(f"no experiment that would tell them apart is proposed: {why}")
     if result.not_tried:
         every.append(
-            f"not tried: {', '.join(result.not_tried)}, because each depends on the other axis, "
-            "and with more than two axes it is not known which that is; diagnose a model of two "
-            "axes alone"
+            f"not tried: {', '.join(result.not_tried)}, as each depends on the other axis, and of "
+            "more than two it is not known which; diagnose a model of two axes alone"
         )
     return tuple(note for note in every if note)
 
@@ -293,7 +288,6 @@ def _beyond_in_words(told: Told, error: str) -> str | None:
     if told.selection_ratio is None or told.selection_ratio < RULE.at_floor:
         return None
     return (
-        f"what was said holds for the training logs: on the selection logs the {error} is "
-        f"{told.selection_ratio:.1f} times its noise floor. Give such a log as a training log too, "
-        "so that what it shows is looked for"
+        f"this holds for the training logs alone: on the selection logs the {error} is "
+        f"{told.selection_ratio:.1f} times its noise floor. Give such a log as a training log too"
     )

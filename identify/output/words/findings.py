@@ -8,12 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.dataset import Role
-from identify.output.numbers import (
-    Scale,
-    number,
-    percent,
-    quantity,
-)
+from identify.output.numbers import Scale, change, number, percent, quantity
+from identify.output.words.commands import fitted_curves
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
@@ -29,21 +25,27 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
     removes, control = (percent(max(p, 0.0)) for p in (finding.score.part, finding.score.control))
     said = [
         _explained(finding),
-        f"On the logs that decided it removes {removes} of what is left above the noise floor",
-        f"The same force shifted in time, which cannot be real, removes at most {control} (19 of "
+        f"Of what is left without it, above the noise floor, it removes {removes} on the logs that "
+        f"decided; the same force shifted in time, which cannot be real, at most {control} (19 of "
         "20 times)",
     ]
     if finding.kind is not FindingKind.WRONG_SHAPE and finding.parameters:
         units, known = finding.parameter_units, finding.parameters.items()
         values = ", ".join(f"{n} = {quantity(v, units.get(n, '1'))}" for n, v in known)
         said.append(f"Found: {values}")
-    return tuple(words(text) for text in (*said, _sure(finding)))
+    if finding.confidence is None:
+        said.append("No confidence is stated, as the test logs do not confirm it")
+    else:
+        right = percent(finding.confidence)
+        said.append(f"{right} of answers that remove so much were right in the self-test")
+    return tuple(words(text) for text in said)
 
 
 def _explained(finding: Finding) -> str:
     tested = finding.tested
     error = "test error" if tested.on is Role.TEST else f"error on the {tested.on.value} logs"
-    before, after = (quantity(e, finding.unit) for e in (tested.before, tested.after))
+    before, after = change(tested.before, tested.after, finding.unit)
+    before += after[after.index(" ") :]
     what, without, with_it = finding.effect, "without it", "with it"
     if finding.kind is FindingKind.RESEMBLES:
         shape = "in another shape; that law"
@@ -71,42 +73,24 @@ def _exponents_in_words(bend: FreeExponent) -> list[str]:
     return [f"{bend.parameter} = {value.strip()}" for value in values]
 
 
-def _sure(finding: Finding) -> str:
-    """How often such an answer was right, and how much is left; none where tests contradict."""
-    if finding.confidence is None:
-        return "No confidence is stated, as the test logs do not confirm it"
-    # Noise is part of what is left, and so never more.
-    left, fitted = max(finding.left, 1.0), max(finding.left_fitted, 1.0)
-    sure = (
-        f"{percent(finding.confidence)} of such answers were right in the self-test. What is left "
-        f"is {left:.2f} times the noise floor on the {finding.chosen.on.value} logs"
-    )
-    if finding.chosen.on is not Role.TRAINING:
-        sure += f", {fitted:.2f} times on the training logs"
-    more = max(left, fitted) >= RULE.at_floor
-    return sure + (", so something else is missing too" if more else "")
-
-
-SHARES = (
-    "each share is of that effect taken out alone, the others refitted, so the shares need not sum "
-    "to 100 %"
-)
-
-
-def together_in_words(found: AxisDiagnosis) -> list[str]:
-    """Of named effects that need each other: that they do, and how both are added."""
-    names = [f.effect for f in found.findings]
-    above = found.tested.before**2 - found.base.floor**2
-    take = ""
-    if len(names) == 2 and above > 0.0:
-        taken = min((found.tested.before**2 - found.tested.after**2) / above, 1.0)
-        take = (
-            f"; together they explain {percent(taken)} of the squared error above the noise floor"
-        )
+def all_in_words(found: AxisDiagnosis) -> list[str]:
+    """Of several findings: what they explain together, and which need each other."""
+    if len(found.findings) < 2:
+        return []
+    share = percent(found.explained)
     return [
-        f"{first} and {second} are needed together, so the logs prove neither alone{take}: "
-        f"twin add {first} MODEL LOG... -o first.toml, then twin add {second} first.toml LOG... "
-        "-o both.toml; judge after the second (the first ends with exit code 1)"
+        f"together they explain {share} of the squared error above the noise floor; each share "
+        "above is lost when that effect alone is taken out and the others are refitted",
+        *pairs_in_words(found),
+    ]
+
+
+def pairs_in_words(found: AxisDiagnosis) -> list[str]:
+    """Of named effects that need each other, that they do."""
+    names = [f.effect for f in found.findings]
+    return [
+        f"{first} and {second} are needed together, so the logs prove neither alone: add both and "
+        "judge after the second (the first twin add ends with exit code 1)"
         for i, first in enumerate(names)
         for second in found.findings[i].together
         if second in names[i + 1 :]
@@ -136,16 +120,21 @@ def shape_in_words(effect: str, shape: FoundShape) -> str:
     )
 
 
-def remainder_in_words(found: AxisDiagnosis) -> str | None:
-    """How large the error is that remains beside what was named, or None where it is noise."""
-    if not found.findings or found.unexplained is None:
-        return None
-    fit = found.with_named
-    beside = " beside the named effects" if found.named else ""
-    return (
-        f"what remains{beside} is {quantity(fit.error, fit.axis.units.force)} on the training "
-        f"logs, {fit.ratio:.1f} times the noise floor"
-    )
+def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
+    """How much is left beside what was found, and whether something else is missing too.
+
+    floor: of the training logs, N RMS.
+    """
+    if not found.findings:
+        return []
+    one = found.findings[0]  # noise is part of what is left, and so never more
+    chosen, fitted = max(one.left, 1.0), max(found.final.error / floor, 1.0)
+    said = f"What is left is {fitted:.2f} times the noise floor on the training logs"
+    if one.chosen.on is not Role.TRAINING:
+        said += f" and {chosen:.2f} times on the {one.chosen.on.value} logs"
+    if max(chosen, fitted) < RULE.at_floor:
+        return [f"{said}: noise."]
+    return [f"{said}: something else is missing too."]
 
 
 # --- what to do next --------------------------------------------------------------------------
@@ -168,13 +157,5 @@ def advice(findings: Sequence[Finding] = ()) -> str:
             first = f"twin add {f.effect}, then " if resembles else ""
             shaped = f"{first}twin add --shape {f.effect}"
             return f"{shaped} gives the model the shape that the logs show"
-    known = [e.name for e in catalogue.values() if e.is_nonparametric and not e.free_shape]
-    return f"twin add {' or '.join(known)} lowers the error by fitted curves, without explaining it"
-
-
-def next_command(found: AxisDiagnosis) -> list[str]:
-    """The command that adds what is named first, where that stands by itself and is confirmed."""
-    first = found.missing[0] if found.missing else None
-    if first is None or first.together or first.tied or first.contradicted:
-        return []
-    return [f"next: twin add {found.named[0]} MODEL LOG... -o better.toml"]
+    curves = " or ".join(fitted_curves())
+    return f"twin add {curves} lowers the error by fitted curves, without explaining it"

@@ -18,14 +18,7 @@ from identify.estimation.intervals import (
     OpenSided,
 )
 from identify.estimation.simulated_motion import MotionFit
-from identify.output.numbers import (
-    Scale,
-    arrow,
-    change,
-    number,
-    percent,
-    quantity,
-)
+from identify.output.numbers import Scale, arrow, change, number, percent, quantity
 from identify.results.results import SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
@@ -49,9 +42,8 @@ MOTION_OUTCOMES = {
     Outcome.NOT_CONVERGED: OUTCOMES[Outcome.NOT_CONVERGED],
 }
 HELD_OUT_GREW = (
-    "The error on logs that were not fitted grew, so the force fit is the better one: the noise of "
-    "the measured command or what the model lacks adds up to a drift, and the parameters have "
-    "followed it."
+    "The error on logs that were not fitted grew, so the force fit is the better one: noise of the "
+    "command, or what the model lacks, adds up to a drift that the parameters have followed."
 )
 
 
@@ -156,29 +148,25 @@ HALF = 0.15  # samples, within which a shift of half a sample is told as such
 
 def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
     """What was done to the logs before they were fitted, that a reader should know."""
-    axis, words = dataset.axis, dataset.units.words
-    said = [channel_delay_in_words(dataset)]
+    words, tests = dataset.units.words, {log.motion.name for log in dataset.test}
+    said = [words(delay)] if (delay := channel_delay_in_words(dataset)) else []
     if own := dataset.force_noise:
         said.append(
-            f"axis {axis}: the noise floor holds {quantity(own, dataset.units.force)} of "
-            f"{words('force')} that nothing measured foretells, beside what sensors make: noise of "
-            "the drive or of what surrounds it"
+            f"the noise floor includes {quantity(own, dataset.units.force)} of {words('force')} "
+            "noise that no sensor explains: of the drive or of its surroundings"
         )
     said += [
-        f"{log}: the first {quantity(end, 's')} of axis {axis} are left out, as its "
-        f"{words('force')} there fits nothing that follows: the axis did not yet move freely. "
-        "Cut the log, or begin it in motion"
+        f"{log}: the first {quantity(end, 's')} are left out, as their {words('force')} fits "
+        "nothing that follows: the axis did not yet move freely. Cut the log, or begin it in motion"
         for log, end in dataset.begun.items()
     ]
-    tests = {log.motion.name for log in dataset.test}
     said += [
-        f"{log}: a {'test' if log in tests else 'selection'} log, but {percent(part)} of it lies "
-        f"at positions of axis {axis} where no training log has been; there it tests nothing and "
-        "is left out"
+        f"{log}: {percent(part)} of this {'test' if log in tests else 'selection'} log is left "
+        "out: it lies at positions where no training log has been"
         for log, part in dataset.beyond.items()
         if part > WORTH_SAYING
     ]
-    return tuple(text for text in said if text)
+    return tuple(said)
 
 
 def channel_delay_in_words(dataset: Dataset) -> str | None:
@@ -186,19 +174,12 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
     if dataset.channel_delay == 0.0:
         return None
     samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
-    words = dataset.units.words
-    why = (
-        f"which no drive can do; the log was corrected. Check how {words('force and position')} "
-        "are sampled"
-    )
+    why = "no drive can do that, so check how force and position are sampled"
     if abs(samples - 0.5) < HALF:
-        why = (
-            f"as where {words('force and position')} are read at the same instant, while a command "
-            "would be held over the sample; the log was corrected"
-        )
+        why = "force and position seem to be read at the same instant"
     return (
-        f"axis {dataset.axis}: the {words('force')} acts {1e6 * dataset.channel_delay:.0f} µs "
-        f"({samples:.2f} samples) before its time stamp, {why}"
+        f"the force acts {1e6 * dataset.channel_delay:.0f} µs ({samples:.2f} samples) before its "
+        f"time stamp, and was moved by as much: {why}"
     )
 
 
@@ -209,9 +190,8 @@ def aliasing_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
         return None
     return (
         f"{quantity(folded, units.force)} of the noise floor of "
-        f"{quantity(noise.value, units.force)} is the command's fast part, which the log keeps "
-        "only every few samples of the controller: log at the control rate, or the drive's "
-        "averaged current"
+        f"{quantity(noise.value, units.force)} is the command's fast part, of which the log keeps "
+        "single samples: log at the control rate, or the drive's averaged current"
     )
 
 

@@ -7,11 +7,7 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.output.numbers import (
-    Scale,
-    number,
-    quantity,
-)
+from identify.output.numbers import Scale, number, quantity
 from twin.experiments.file import in_short
 
 

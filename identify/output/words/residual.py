@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identify.estimation.residual_dependence import Dependence, Repeat
-from identify.output.numbers import (
-    number,
-    percent,
-    quantity,
-    spaced,
-    span,
-)
+from identify.output.numbers import number, percent, quantity, spaced, span
 from identify.validation.misfit_maps import Region
 from identify.validation.whiteness import Correlation, Loop
 from twin.model.units import units_of
@@ -24,6 +18,12 @@ def region_in_words(region: Region) -> str:
         f"{number(region.ratio)} times the noise floor, {percent(region.share)} of the squared "
         "error"
     )
+
+
+def worst_in_words(region: Region) -> str:
+    """E.g. "It is largest at position between 12.3 and 25.7 mm: ..."."""
+    at = "" if region.coordinate in ("standstill", "direction") else "at "
+    return f"It is largest {at}{region_in_words(region)}."
 
 
 def place_in_words(region: Region) -> str:
@@ -61,25 +61,19 @@ def repeat_in_words(repeat: Repeat) -> str:
     )
 
 
-_WHITENESS = (
-    " Only the force residual is tested for whiteness: a simulated-position residual is coloured "
-    "even when the model is right"
-)
-_ONE_STEP = ", and a one-step-ahead residual is small even when the model is wrong."
+EARLIER = "so the residual is tested only against earlier values of command and speed"
 LOOPS = {
     Loop.CLOSED: (
-        "Closed loop: feedback carries position noise into the force. The free run therefore uses "
-        "the logged command, and the residual is tested only against earlier values of command "
-        f"and speed.{_WHITENESS}{_ONE_STEP}"
+        f"Closed loop: feedback carries position noise into the force, {EARLIER}; the free run "
+        "uses the logged command."
     ),
     Loop.OPEN: (
         "Open loop: the command does not depend on the measurement noise, so the residual is "
-        f"tested against it at all lags.{_WHITENESS}{_ONE_STEP}"
+        "tested against it at all lags."
     ),
     Loop.UNKNOWN: (
-        "The logs hold no setpoint, so the loop is assumed to be closed: feedback may carry "
-        "position noise into the force, and the residual is tested only against earlier values of "
-        f"command and speed.{_WHITENESS}."
+        "The logs hold no setpoint, so the loop is taken to be closed: feedback may carry position "
+        f"noise into the force, {EARLIER}."
     ),
 }
 

@@ -17,14 +17,18 @@ from identify.output.report.answer import notes
 from identify.output.report.page import Tone, page
 from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
-from identify.output.words.diagnosis import SEVERAL, VERDICTS, remarks_on
-from identify.output.words.findings import SHARES, advice, finding_in_words
+from identify.output.words.diagnosis import VERDICTS, remarks_on
+from identify.output.words.findings import advice, all_in_words, finding_in_words
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
 from identify.output.words.residual import place_in_words, region_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 
+SEVERAL = (
+    "The model lacks several effects: the training logs and the selection logs prove them. The "
+    "logs cannot tell cogging from quadratic_drag."
+)
 TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
 
 
@@ -47,7 +51,8 @@ def cards(diagnosis=None, **changes):
 def test_the_answer_for_an_ambiguity():
     first, second = cards(made.diagnosed())
     assert first.headline == "Axis x: cogging or quadratic drag, and lugre are missing"
-    assert (first.sentence, first.tone) == (SEVERAL, Tone.STRONG)
+    assert first.sentence.startswith(SEVERAL)
+    assert first.tone is Tone.STRONG
     tiles = [(t.name, t.value, t.remark) for t in first.tiles]
     ratio = arrow(8.37 / 2.03, 3.19 / 2.03, "1")
     assert tiles == [
@@ -59,22 +64,17 @@ def test_the_answer_for_an_ambiguity():
     findings = [spaced(". ".join(finding_in_words(f))) for f in made.FOUND]
     assert first.remarks == [
         *map(capitalised, findings),
-        capitalised(SHARES),
-        "Runner-up: quadratic drag, evidence (difference of BIC) 423, selection error 7.34 -> "
-        "2.38 N, proved too.",
+        *map(capitalised, all_in_words(made.diagnosis_of())),
         next_step_in_words(made.plan_of("cogging", "quadratic_drag")),
     ]
     assert second.headline == "Axis y: nothing is missing"
     assert second.tone is Tone.PLAIN
     words = refit_in_words(made.refit_of(0.01))
-    assert second.remarks[-1] == f"{words[0].upper()}{words[1:]}."
-    assert second.remarks[0].startswith(
-        "Nearest candidate: constant force, evidence (difference of BIC) 66.0"
-    )
-    assert second.remarks[0].endswith("gain uncertain: t = 1.3, where 1.6 is sure.")
+    assert second.remarks == [f"{words[0].upper()}{words[1:]}."]
     assert [(t.name, t.value) for t in second.tiles] == [
-        ("Force error", "1.07 N"), ("Error over noise floor", number(1.07 / 0.97)),
-        ("Position, free run", "1.90 mm"),
+        ("Force error, training logs", "1.07 N"),
+        ("Force error, selection logs", "7.81 N"),
+        ("Error over noise floor", number(1.07 / 0.97)), ("Position, free run", "1.90 mm"),
     ]  # fmt: skip
 
 
@@ -82,15 +82,15 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{SEVERAL} What remains beside the named effects is 3.19 N on the training logs, "
-        "1.6 times the noise floor. The error depends most on other axis position"
+        f"{SEVERAL} What is left is 1.57 times the noise floor on the training logs and 1.00 times "
+        "on the selection logs: something else is missing too. The error depends most on other"
     )
     where = region_in_words(made.LEFT_OVER)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. On the logs that"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. Of what is left"
     assert told in card.remarks[0]
-    assert "need not sum to 100 %" in card.remarks[2]
+    assert card.remarks[2].startswith("Together they explain 98 % of the squared error above")
 
 
 def test_an_effect_that_a_missing_one_resembles():
@@ -111,7 +111,6 @@ def test_the_answer_for_what_nothing_explains():
         "which accounts for 63 % of the squared error, with a period of 27.3 mm."
     )
     assert f"{advice()}." in card.remarks
-    assert card.remarks[0].startswith("Nearest candidate: cogging")
     aperiodic = replace(lost, unexplained=replace(made.STRUCTURE, period=None))
     assert "period" not in cards(made.diagnosed(aperiodic))[0].sentence
 
@@ -125,8 +124,7 @@ def test_the_answer_for_one_effect_without_held_out_logs():
     card, _ = cards(replace(found, next_experiments={"x": made.plan_of("a", "b", ranking=(
         replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
     assert card.headline == "Axis x: cogging is missing"
-    assert "cross-validated error" in card.remarks[1]
-    assert "comes nearest to deciding, but is too short" in card.remarks[2]
+    assert "comes nearest to deciding, but is too short" in card.remarks[1]
     logs = "'run 1' 'run 2' --holdout 'held 1'"
     assert card.commands == [f"twin add cogging MODEL {logs} -o better.toml"]
 
@@ -135,7 +133,7 @@ def test_what_the_test_logs_contradict_stands_in_the_headline():
     against = replace(made.FOUND[0], tied=(), tested=made.errors(2.17, 2.29, Role.TEST)[0])
     card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(against,))))
     assert card.headline == ("Axis x: cogging is missing (not confirmed by the test logs: cogging)")
-    assert not any("% of such answers" in r for r in card.remarks)
+    assert not any("in the self-test" in r for r in card.remarks)
     assert card.commands == []
 
 

@@ -10,8 +10,8 @@ from identify.output.numbers import Scale, number, spaced, title_case, typeset
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (1.234e-4, "0.000123"),
-        (9.87e-5, "9.87×10⁻⁵"),
+        (1.234e-3, "0.00123"),
+        (9.87e-4, "9.87×10⁻⁴"),
         (-1.234e7, "−1.23×10⁷"),
         (1234567.0, "1234567"),
     ],

@@ -131,6 +131,7 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
         (1.234, "N", "1.23 N"),
         (-3.3e-4, "s", "−330 µs"),
         (1e-9, "m", "1.00 nm"),
+        (7.18e-4, "kg", "7.18×10⁻⁴ kg"),
         (0.018, "N s/m", "0.0180 N·s/m"),
         (12345.0, "N/m^2", "12345 N/m²"),
         (2.0, "1", "2.00"),
@@ -162,3 +163,5 @@ def test_an_interval_sets_the_digits_of_its_value() -> None:
     assert scale.within(0.02698, 0.02702, 0.02698, 0.027, 0.02702) == ["26.980", "27.000", "27.020"]
     assert Scale.of("N", [1.0]).within(-1.0, 1.0, -0.01) == ["0.0"]
     assert Scale.of("N", [1.0]).within(1.0, 1.0, 1.0) == ["1.00"]
+    small = Scale.of("kg m^2", [4.768e-6]).within(4.740e-6, 4.795e-6, 4.740e-6, 4.768e-6)
+    assert small == ["4.740e-06", "4.768e-06"]

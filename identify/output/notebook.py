@@ -1,0 +1,75 @@
+"""Results in a notebook: tables in place of text, and the residual over any coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from identify.output.numbers import Scale, capitalised
+from identify.output.report import SECTIONS, sections
+from identify.output.report.effects import fit_table
+from identify.output.report.explorer import coordinate_of_answer, named_signals
+from identify.output.report.page import Block, Chart, Heading, Listing, fragment
+from identify.output.report.subject import Subject
+from identify.results.results import Comparison, Diagnosis, FitResult
+from identify.results.signals import means
+from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = ("answer", "found", "regions", "parameters", "logs")  # sections of a report
+INKS = ("#2f6db3", "#b4530f")  # without and with what was found, as on a page
+
+
+def _subject(result: Diagnosis | Comparison) -> Subject:
+    diagnosis = result if isinstance(result, Diagnosis) else None
+    comparison = result.comparison if isinstance(result, Diagnosis) else result
+    return Subject("", diagnosis, comparison, (), ())
+
+
+def tables(result: Diagnosis | Comparison) -> str:
+    """The answer and the tables of a report, without its plots."""
+    parts = [part for part in SECTIONS if part.anchor in SHOWN]
+    blocks: list[Block] = []
+    for section in sections(_subject(result), parts):
+        blocks += [Heading(section.title)] if section.anchor != "answer" else []
+        blocks += [block for block in section.blocks if not isinstance(block, Chart)]
+    return fragment(blocks)
+
+
+def parameters(result: FitResult, said: Mapping[str, Iterable[str]]) -> str:
+    """What is said of each axis, with its parameters in a table."""
+    blocks: list[Block] = []
+    for axis, fit in result.fits.items():
+        lines = [capitalised(line.strip()) for line in said[axis]]
+        blocks += [Listing(lines), fit_table(fit.axis, result.estimates[axis])]
+    return fragment(blocks)
+
+
+def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str | None) -> Figure:
+    """The residual without and with what was found, as dots and as means over a coordinate."""
+    import matplotlib.pyplot as plt
+
+    views = {view.name: view for view in _subject(result).views}
+    if axis is not None and axis not in views:
+        raise InputError(f"no axis '{axis}' in the result; it has {', '.join(views)}")
+    view = views[axis] if axis else next(iter(views.values()))
+    signals = view.signals
+    name = coordinate or coordinate_of_answer(view, list(signals.coordinates))
+    values = signals.over(name)
+    left = Scale.of(view.units.force, [3.0 * signals.size])
+    shown = named_signals(view, left)
+    label, _, along = shown.get(name, ("Time", values, Scale.of("s", values)))
+    figure, place = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
+    plt.close(figure)  # a notebook shows what is returned, once
+    floor = float(left(view.axis.floor))
+    place.axhspan(-floor, floor, color="#dfe4e9", label="noise floor")
+    for which, ink in zip(("before", "after"), INKS, strict=True):
+        if which in shown:
+            title, error, _ = shown[which]
+            place.plot(along(values), left(error), ".", markersize=2, alpha=0.25, color=ink)
+            place.plot(*means(along(values), left(error)), color=ink, label=f"mean {title}")
+    place.set(xlabel=along.label(label), ylabel=left.label(view.words("Unexplained force")))
+    place.legend()
+    return figure
