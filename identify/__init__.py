@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from identify.workflow import *
 
 __all__ = [
-    "Addition", "Agreement", "Comparison", "Diagnosis", "FitResult", "SimulationFit", "add",
-    "add_shape", "agree", "along_track", "cable_force", "compare", "diagnose", "dynamic_friction",
-    "fit", "fit_simulation", "friction_map", "plan", "velocity_map",
+    "Addition", "Agreement", "Comparison", "Diagnosis", "Feedforward", "FitResult",
+    "SimulationFit", "add", "add_shape", "agree", "along_track", "cable_force", "compare",
+    "diagnose", "dynamic_friction", "feedforward", "fit", "fit_simulation", "friction_map", "plan",
+    "velocity_map",
 ]  # fmt: skip
 
 

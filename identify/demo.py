@@ -13,9 +13,10 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
+from identify.output.numbers import quantity
 from identify.output.report import Source, write_report
 from identify.results.addition import Addition
-from identify.results.results import Diagnosis
+from identify.results.results import Diagnosis, Feedforward
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -42,6 +43,7 @@ class Demo:
     hidden: Fitted
     diagnosis: Diagnosis
     addition: Addition | None
+    feedforward: Feedforward | None
     report: Path
 
     @property
@@ -79,7 +81,7 @@ def demo(
     known = ", ".join(model.axes[_first(model)].names)
     say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, test, catalogue=catalogue, progress=progress)
-    addition = None
+    addition, worth = None, None
     final = diagnosis.model
     if diagnosis.effect is not None:
         say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.dataset.axis}")
@@ -89,6 +91,10 @@ def demo(
         )  # fmt: skip
         final = addition.model
         say(_fallen(addition))
+        worth = workflow.feedforward(
+            final, test, diagnosis.model, machine=machine, progress=progress
+        )
+        say(_followed(worth, addition.step.axis))
     save_model(final, folder / BETTER)
     report = folder / "report.html"
     write_report(
@@ -100,7 +106,7 @@ def demo(
         additions=[addition] if addition else [],
         source=Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
     )
-    return Demo(hidden, diagnosis, addition, report)
+    return Demo(hidden, diagnosis, addition, worth, report)
 
 
 def _record(
@@ -125,6 +131,17 @@ def _fallen(addition: Addition) -> str:
         f"4. added: on the test log, which decided nothing, the force error falls from "
         f"{1e3 * before:.2f} {unit} to {1e3 * after:.2f} {unit}, {before / after:.0f} times; the "
         f"noise floor is {1e3 * floor:.2f} {unit}"
+    )
+
+
+def _followed(worth: Feedforward, axis: str) -> str:
+    found, unit = worth.axes[axis], worth.model.axes[axis].units.position
+    assert found.before is not None
+    return (
+        "5. as feedforward, the RMS tracking error of the machine on the motion of the test log "
+        f"falls from {quantity(found.before.rms, unit)} with the model before to "
+        f"{quantity(found.diagnosed.rms, unit)}; under feedback alone it is "
+        f"{quantity(found.without.rms, unit)}"
     )
 
 

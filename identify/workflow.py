@@ -30,7 +30,13 @@ from identify.experiment_design.plan import plan as plan
 from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
-from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.results import (
+    Comparison,
+    Diagnosis,
+    Feedforward,
+    FitResult,
+    SimulationFit,
+)
 from identify.results.told import Told, told_of
 from identify.selection.curves import having_shape
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
@@ -39,6 +45,7 @@ from identify.selection.trying import reshape, try_effect
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.comparison import SideBySide, compare_axis, position_errors, side_by_side
 from identify.validation.misfit_maps import worst_region
+from identify.validation.tracking import tracking
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
@@ -310,6 +317,28 @@ def add_shape(
     progress("adding", 0, 1)
     best, shape = reshape(effect, fits, before.datasets)
     return _with_notes(addition(best, fits[best.axis], before.datasets, before.model, model, shape))
+
+
+@parallel()
+def feedforward(
+    model: Model,
+    logs: GivenLogs,
+    before: Model | None = None,
+    *,
+    machine: Model | None = None,
+    catalogue: Catalogue | None = None,
+    progress: Progress = silent,
+) -> Feedforward:
+    """The tracking error with the feedforward of a model, with that of one before, and without.
+
+    In simulation, along the motion of the logs. machine: what is simulated, the model itself where
+    None. Raises InputError, and CannotRun where the machine cannot be simulated.
+    """
+    model, given, *_ = _given(model, logs, catalogue=catalogue)
+    before = None if before is None else as_model(before, catalogue)
+    simulated = model if machine is None else as_model(machine, catalogue)
+    found = tracking(simulated, model, before, given, progress)
+    return Feedforward(model, before, tuple(given), found)
 
 
 def add_named(found: Diagnosis) -> Addition | None:

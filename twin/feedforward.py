@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from twin.core.walks import walk
-from twin.effect import IO_SIZE, Kind, U, V, X
+from twin.effect import DT, INDEX, IO_SIZE, TIME, Kind, Law, U, V, X
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.signals import Array
 
 # N, tried to see whether an actuation is a straight line of the command
 FORCES = tuple(sign * 10.0**k for k in range(-6, 7) for sign in (1.0, -1.0))
+RAMPS = (0.1, 100.0)  # N/s, slopes of commands that tell how late a force is
+RAMP_PERIOD, RAMP_SAMPLES = 1e-3, 2000  # s: over the longest lag of the catalogue ten times
 ROUNDS = 12  # of a friction that depends on the force it is part of, by that of the sample before
 
 
@@ -32,23 +35,27 @@ class Followed:
     """By effect, what is kept nearly: in which respect."""
     lost: Mapping[str, str]
     """By effect, what is not: why."""
+    late: float
+    """By how much the drive's force is late, s: the setpoint has to be given as much earlier."""
 
 
 def followed(axis: AxisModel) -> Followed:
     """What a feedforward keeps of an axis."""
-    approximated, lost = {}, {}
+    approximated, lost, late = {}, {}, 0.0
     for f in axis.effects:
         if not f.effect.is_present(f.values):
             continue
         if f.effect.kind is Kind.SENSING:
             lost[f.effect.name] = "it changes the reading, not the force"
-        elif f.effect.dead_time:
-            late = next(v for v in f.values.values() if v)
-            lost[f.effect.name] = (
-                f"it delays the force: feed the setpoint forward {late:.3g} s ahead of its time"
-            )
         elif f.effect.kind is Kind.ACTUATION and not _can_be_undone(f):
-            lost[f.effect.name] = "the force is no straight line of the command of this instant"
+            by = _late_by(f.effect.law, tuple(f.vector()), len(f.effect.states))
+            late += by or 0.0
+            if by is None:
+                lost[f.effect.name] = "the force is no straight line of the command of this instant"
+            else:
+                approximated[f.effect.name] = (
+                    f"it makes the force {by:.3g} s late: give it the setpoint of as much later"
+                )
         elif f.effect.kind is Kind.MODIFIER and f.effect.reads("U"):
             approximated[f.effect.name] = (
                 "it depends on the force that it is part of: the friction in that is the one of "
@@ -56,8 +63,11 @@ def followed(axis: AxisModel) -> Followed:
             )
         elif f.effect.reads("TIME"):
             approximated[f.effect.name] = "its time begins at the first call, its phase with it"
-    kept = tuple(f for f in axis.effects if f.effect.name not in lost)
-    return Followed(replace(axis, effects=kept), approximated, lost)
+    kept = tuple(
+        f for f in axis.effects
+        if f.effect.name not in lost and (f.effect.kind is not Kind.ACTUATION or _can_be_undone(f))
+    )  # fmt: skip
+    return Followed(replace(axis, effects=kept), approximated, lost, late)
 
 
 def _can_be_undone(fitted: Fitted) -> bool:
@@ -74,6 +84,25 @@ def _can_be_undone(fitted: Fitted) -> bool:
     zero, slope = force(0.0), force(1.0) - force(0.0)
     straight = (abs(force(u) - zero - slope * u) <= 1e-9 * abs(u) + abs(zero) for u in FORCES)
     return abs(slope) > 0.0 and all(straight)
+
+
+@lru_cache(maxsize=256)
+def _late_by(law: Law, values: tuple[float, ...], n_states: int) -> float | None:
+    """By how much a force is late that follows every command in the end, s; None where none does.
+
+    From ramps of commands: one that is late trails them by its time, whatever their slope.
+    """
+    trailing = []
+    for slope in RAMPS:
+        states, io = [0.0] * n_states, [0.0] * IO_SIZE
+        io[DT] = RAMP_PERIOD
+        for k in range(RAMP_SAMPLES):
+            io[INDEX], io[TIME], io[X], io[U] = k, k * io[DT], 0.1, slope * k * io[DT]
+            law(values, states, io)
+            if k in (RAMP_SAMPLES // 2, RAMP_SAMPLES - 1):
+                trailing.append(k * io[DT] - io[U] / slope)
+    same = np.ptp(trailing) <= 0.01 * abs(trailing[0])
+    return trailing[-1] if same and trailing[0] > 0.0 else None
 
 
 def feedforward(axis: AxisModel, motion: Array, others: Array, period: float) -> Array:

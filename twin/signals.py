@@ -46,6 +46,13 @@ def cubic_through(times: Array, values: Array, at: Array) -> Array:
     return np.asarray(ends + apart * done * left * (left * slope[gap] - done * slope[gap + 1]))
 
 
+def moving_mean(signal: Array, samples: int) -> Array:
+    """Mean (n,) of ``samples`` around each, an odd number; beyond the ends are the end values."""
+    side = samples // 2
+    padded = np.concatenate([np.full(side, signal[0]), signal, np.full(side, signal[-1])])
+    return np.convolve(padded, np.full(samples, 1.0 / samples), "valid")
+
+
 def local_parabola(
     signal: Array, samples: int, *, derivative: int = 0, period: float = 1.0
 ) -> Array:

@@ -1,4 +1,4 @@
-"""Commands of the loop: fit, compare, diagnose, add, agree, plan, demo."""
+"""Commands of the loop: fit, compare, diagnose, add, agree, feedforward, plan, demo."""
 
 from __future__ import annotations
 
@@ -228,6 +228,30 @@ def agree(
 
 
 @app.command()
+def feedforward(
+    model: Model,
+    logs: Logs,
+    before: Annotated[
+        str | None, typer.Option("--before", help="Model to compare with (.toml).")
+    ] = None,
+    effects: Effects = None,
+) -> Said:
+    """Tell what the model is worth as feedforward: the tracking error with it, in simulation.
+
+    Example: twin feedforward better.toml test.mcap --before fitted.toml
+    """
+    from identify import workflow
+    from twin.model.file import load_model
+
+    machine, catalogue = loaded(model, effects)
+    earlier = None if before is None else load_model(before, catalogue)
+    result, findings, silent = with_logs(
+        partial(workflow.feedforward, before=earlier), machine, logs
+    )
+    return said_of(result, [*findings, *silent])
+
+
+@app.command()
 def plan(
     model: Model,
     logs: Annotated[
@@ -312,7 +336,8 @@ def demo(
         hidden=hidden,
         diagnosis=answer_of(result.diagnosis),
         addition=result.addition and answer_of(result.addition),
+        feedforward=result.feedforward and answer_of(result.feedforward),
     )
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
-    text = f"5. the hidden effect was {hidden}: {verdict}\nreport: {result.report}"
+    text = f"the hidden effect was {hidden}: {verdict}\nreport: {result.report}"
     return Said(text, answer, fine=result.named)

@@ -43,7 +43,13 @@ from identify.output.words.plan import (
 from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
 from identify.results.addition import Addition
-from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.results import (
+    Comparison,
+    Diagnosis,
+    Feedforward,
+    FitResult,
+    SimulationFit,
+)
 from identify.results.told import Told
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
@@ -245,6 +251,29 @@ def add_text(result: Addition) -> str:
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
         lines.append(f"  {proved_in_words(result)}")
+    return "\n".join(lines)
+
+
+@text_of.register
+def feedforward_text(result: Feedforward) -> str:
+    """By axis the tracking errors in simulation, and what each effect gains."""
+    lines = [f"in simulation, on the motion of {', '.join(result.logs)}"]
+    for axis, found in result.axes.items():
+        unit = result.model.axes[axis].units.position
+        errors = {
+            "feedback alone": found.without,
+            "with the feedforward of the model before": found.before,
+            "with that of the model": found.diagnosed,
+        }
+        scale = Scale.of(unit, [found.without.rms])
+        lines.append(f"axis {axis}: tracking error, RMS and largest")
+        lines += [
+            f"  {name}: {scale.text(e.rms)}, {scale.text(e.largest)}"
+            for name, e in errors.items()
+            if e is not None
+        ]
+        lines += [f"    {e} gains {scale.text(gain)}" for e, gain in found.gains.items()]
+        lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]
     return "\n".join(lines)
 
 

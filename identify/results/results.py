@@ -16,7 +16,9 @@ from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import Region
+from identify.validation.tracking import AxisTracking
 from twin.effect import Effect
+from twin.feedforward import followed
 from twin.model.machine import MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 
@@ -90,6 +92,24 @@ class Comparison(Pictured):
 
     model: MachineModel
     axes: Mapping[str, AxisComparison]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Feedforward(Printed):
+    """What the feedforward of a model is worth on the motion of logs, by axis that moves there.
+
+    before: the model whose feedforward it is compared with; None where none was given.
+    """
+
+    model: MachineModel
+    before: MachineModel | None
+    logs: tuple[str, ...]
+    axes: Mapping[str, AxisTracking]
+
+    @property
+    def lost(self) -> Mapping[str, Mapping[str, str]]:
+        """By axis and effect, what the feedforward cannot hold, and why."""
+        return {name: followed(self.model.axes[name]).lost for name in self.axes}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -34,7 +34,7 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
         done = twin(*asked, "--json", folder=tmp_path)
     told, said = json.loads(done.stdout), done.stderr.splitlines()
     assert (done.returncode, told["named"]) == (0, True)
-    assert [line[:2] for line in said if line[1] == "."] == ["1.", "2.", "3.", "4."]
+    assert [line[:2] for line in said if line[1] == "."] == ["1.", "2.", "3.", "4.", "5."]
     hidden = told["hidden"]
     assert told["addition"]["effect"] == hidden
     assert f"names {hidden} on x" in done.stderr
@@ -46,6 +46,8 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     (step,) = written.history
     assert step.test_error_before > 2.0 * step.test_error_after
     assert f"{step.test_error_before / step.test_error_after:.0f} times" in done.stderr
+    tracked = told["feedforward"]["axes"]["x"]
+    assert tracked["diagnosed"]["rms"] < tracked["before"]["rms"] < tracked["without"]["rms"]
     assert (tmp_path / told["report"]).read_text(encoding="utf-8").count("<section") > 3
     assert "cannot be made" in refusal(*asked[:1], "-o", "m.toml/in", folder=tmp_path)
 

@@ -250,8 +250,10 @@ def judged(
     kept = [axis.units.mass_name]
     remarks: dict[bool, list[Remark]] = {False: [], True: []}  # lost: whether more than half
     for effect in axis.names:
-        if effect in found.lost:
-            remarks[True].append(Remark(name, effect, found.lost[effect]))
+        if effect not in found.axis.names:
+            lost = effect in found.lost
+            text = (found.lost if lost else found.approximated)[effect]
+            remarks[lost].append(Remark(name, effect, text))
             continue
         less = axis.without(effect)
         own, in_tables = total - both(less, tabled(less))

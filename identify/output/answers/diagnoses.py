@@ -10,7 +10,12 @@ from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.output.answers.answer import Answer, Entry, File, Number, answer_of, read
-from identify.output.answers.fits import EstimateEntry, RefitEntry, estimate_entries
+from identify.output.answers.fits import (
+    EstimateEntry,
+    FeedforwardAnswer,
+    RefitEntry,
+    estimate_entries,
+)
 from identify.output.words.diagnosis import (
     model_change_in_words,
     not_named_in_words,
@@ -398,3 +403,4 @@ class DemoAnswer(Answer):
     report: File
     diagnosis: DiagnosisAnswer
     addition: AdditionAnswer | None
+    feedforward: FeedforwardAnswer | None

@@ -16,7 +16,7 @@ from identify.output.words.fit import (
     objectives_in_words,
 )
 from identify.output.words.residual import loop_in_words, region_in_words
-from identify.results.results import Comparison, FitResult, SimulationFit
+from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit
 from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
 from twin.model.parameters import free_parameters
@@ -271,6 +271,46 @@ def _agreement(found: AxisAgreement) -> AgreementEntry:
         },
         differing=[d.label for d in found.differing],
     )
+
+
+# --- feedforward -----------------------------------------------------------------------------
+
+
+class TrackingErrorEntry(Entry):
+    """Setpoint minus true position: RMS and largest."""
+
+    rms: Number
+    largest: Number
+
+
+class AxisTrackingEntry(Entry):
+    """Tracking errors of an axis in simulation, and what each effect gains of the RMS."""
+
+    unit: str
+    without: TrackingErrorEntry
+    before: TrackingErrorEntry | None
+    diagnosed: TrackingErrorEntry
+    gains: dict[str, Number]
+    lost: dict[str, str]
+    """Effects that the feedforward cannot hold, and why."""
+
+
+class FeedforwardAnswer(Answer):
+    """What `twin feedforward` prints."""
+
+    logs: list[str]
+    axes: dict[str, AxisTrackingEntry]
+
+
+@answer_of.register
+def _(result: Feedforward, **more: Any) -> FeedforwardAnswer:
+    axes = {
+        name: AxisTrackingEntry.of(
+            found, unit=result.model.axes[name].units.position, lost=result.lost[name]
+        )
+        for name, found in result.axes.items()
+    }
+    return FeedforwardAnswer.of(result, axes=axes, **more)
 
 
 # --- comparisons -----------------------------------------------------------------------------
