@@ -13,7 +13,7 @@ endif
 # What Python compiles is kept for its next start: the tests start it fifty times.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo check test bench selftest thesis docs clean
+.PHONY: demo check test bench selftest thesis docs dist clean
 
 demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
@@ -28,6 +28,7 @@ test: $(VENV)/tests
 check: $(VENV)/tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/repo-review --show err .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -m "not slow" --changed --seconds 15
 
@@ -47,21 +48,36 @@ thesis: $(VENV)/runtime
 docs: $(VENV)/docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
+# What is published, into dist/: the wheel and its source; what they bring with them (SBOM), read off
+# an empty environment that the wheel was installed into, into build/.
+dist:
+	rm -rf dist build
+	$(PYTHON) -m venv build/tools
+	build/tools/bin/python -m pip install --quiet --disable-pip-version-check "pip>=25.1"
+	build/tools/bin/python -m pip install --quiet --group dist
+	build/tools/bin/python -m build --quiet
+	$(PYTHON) -m venv --without-pip build/installed
+	build/tools/bin/python -m pip --python build/installed/bin/python install --quiet dist/*.whl
+	build/installed/bin/twin --version
+	build/tools/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible \
+		--output-file build/proton-twin.cdx.json build/installed/bin/python
+
 $(VENV)/runtime: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
 
 $(VENV)/tests: $(VENV)/runtime
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,view]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev --editable ".[import,view]"
 	@touch $@
 
 $(VENV)/benchmarks: $(VENV)/tests
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[test,import,view,bench]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group bench
 	@touch $@
 
 $(VENV)/docs: $(VENV)/runtime
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group docs
 	@touch $@
 
 clean:

@@ -59,7 +59,9 @@ SCALED = Peer("mujoco.sysid with SciPy, scaled", {"optimizer": "scipy", "x_scale
 def measure() -> list[Figure]:
     """Times and largest parameter errors of both, for two parameters and for LuGre."""
     if not hasattr(sysid, "default_report"):  # without its extras the package is empty
-        return [Figure("mujoco.sysid", None, note="its extras are absent: pip install '.[bench]'")]
+        return [
+            Figure("mujoco.sysid", None, note="its extras are absent: pip install --group bench")
+        ]
     damped, lugre = damped_slide(), lugre_slide()
     motion = record(lugre)
     return [

@@ -17,7 +17,7 @@ from benchmarks.timing import Array, interleaved, ratio
 from twin.core.native import Table
 from twin.effects import load_catalogue
 from twin.experiments.kinds import Tracking
-from twin.experiments.trajectory import Setpoint
+from twin.experiments.trajectory import AnySetpoint
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import call_step, step_address
@@ -56,7 +56,7 @@ def _bare_steps(step, model, data, n):
 class _Simulation:
     """Runs one setpoint in a stage; ``stepping`` collects the seconds within its steps."""
 
-    def __init__(self, model: MachineModel, setpoint: Setpoint, stage: Stage) -> None:
+    def __init__(self, model: MachineModel, setpoint: AnySetpoint, stage: Stage) -> None:
         self.stepping: list[float] = []
         self._model, self._setpoint = model, setpoint
         self._stage = self._timed(stage)

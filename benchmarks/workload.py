@@ -99,12 +99,12 @@ def saved(work: Workload) -> Iterator[tuple[Path, list[Path], list[Path]]]:
     with TemporaryDirectory() as folder:
         model = Path(folder, "one_axis.toml")
         save_model(work.model, model)
-        sets = []
+        sets: list[list[Path]] = []
         for kind, logs in (("plain", work.plain), ("hidden", work.hidden)):
             sets.append([Path(folder, f"{kind}_{name}.mcap") for name in logs])
             for path, log in zip(sets[-1], logs.values(), strict=True):
                 write_log(log, path)
-        yield model, *sets
+        yield model, sets[0], sets[1]
 
 
 def make(duration: float = DURATION) -> Workload:

@@ -46,15 +46,16 @@ class Reach:
         """
         by_line = self.contexts.get(fault.path, {})
         own = by_line.get(fault.line, frozenset())
-        chosen = own or frozenset().union(*by_line.values())
-        chosen = {t for t in self.seconds if t in chosen or t.partition("::")[0] in chosen}
+        reached = own or frozenset().union(*by_line.values())
+        chosen = {t for t in self.seconds if t in reached or t.partition("::")[0] in reached}
         room = self._room(fault)
         if native or not chosen:
             chosen = set(self.seconds)
         elif not own:
             chosen |= {t for t in self.seconds if _folder(t) == room}
         subject = Path(fault.path).stem
-        out, spent = [], 0.0
+        out: list[str] = []
+        spent = 0.0
 
         def order(test: str) -> tuple[bool, bool, bool, float, str]:
             near = _folder(test) == room, f"{_folder(test)}/".startswith(f"{room}/")
