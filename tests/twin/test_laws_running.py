@@ -13,7 +13,6 @@ from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at
 from twin.experiments.trajectory import Setpoint
-from twin.instability import HUGE, require_sound
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.numbers import is_number
 from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
@@ -61,12 +60,6 @@ def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
         np.testing.assert_array_equal(getattr(begin, name), getattr(parts[0], name))
 
 
-def test_each_axis_has_its_own_encoder_noise():
-    done = run(MODEL, setpoint(2000), np.random.default_rng(1), simulator=ReducedSimulator)
-    noise = done.signals[:, :, 0] - done.signals[:, :, 2]
-    assert np.std(noise, axis=0) == pytest.approx([1e-6, 5e-6], rel=0.1)
-
-
 def test_states_are_logged_under_their_names_where_they_are_few():
     done = run(MODEL, setpoint(200), np.random.default_rng(1), simulator=ReducedSimulator)
     states = {f.effect.name: f.effect.states for axis in EFFECTS.values() for f in axis}
@@ -79,48 +72,6 @@ def test_states_are_logged_under_their_names_where_they_are_few():
     bristle = done.states[:, [a for a, _ in done.state_names].index("x")]
     force = done.forces[:, done.table.labels.index(("x", "lugre"))]
     assert np.corrcoef(bristle, force)[0, 1] < -0.9
-
-
-# --- what broke a run ----------------------------------------------------------------------
-
-TABLE = MODEL.table()
-
-
-def broken(sample: int, axis: int, value: float, force: dict | None = None, first: int = 0) -> str:
-    """What is said of a run of 10 samples in which a signal and some forces are bad."""
-    signals, forces = np.zeros((10, 2, 4)), np.zeros((10, len(TABLE.entries)))
-    signals[sample:, axis, 2] = value
-    for (at_sample, label), size in (force or {}).items():
-        forces[at_sample, TABLE.labels.index(label)] = size
-    with pytest.raises(CannotRun) as told:
-        require_sound(signals, forces, MODEL, TABLE, first)
-    return str(told.value)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.1 * HUGE, -1.1 * HUGE])
-def test_a_signal_that_cannot_be_is_told_with_axis_and_time(value):
-    for axis, name in enumerate(MODEL.axes):
-        said = broken(6, axis, value, first=400)
-        assert said.startswith(f"the simulation became unstable at t = 0.4060 s on axis {name}")
-        assert "lower the bandwidth" in said
-    assert "t = 0.0000 s" in broken(0, 0, value)
-
-
-def test_the_effect_whose_force_cannot_be_is_named_with_it():
-    """The force of a sample moves the next one."""
-    label = ("y", "cogging")
-    said = broken(6, 0, np.nan, {(5, label): 3e11})
-    assert "t = 0.0050 s on axis y: effect cogging gives 3e+11 N; change its values" in said
-    said = broken(6, 0, np.nan, {(6, label): np.nan})  # in the same sample
-    assert "t = 0.0060 s on axis y: effect cogging gives nan N" in said
-
-
-def test_else_the_largest_force_of_the_axis_is_named():
-    forces = {(6, ("x", "lugre")): -7.0, (6, ("x", "cable_slab")): 5.0, (6, ("y", "gms")): 90.0}
-    said = broken(6, 0, np.nan, forces)
-    assert "on axis x (its largest force is that of lugre)" in said
-    said = broken(6, 1, np.nan, forces)
-    assert "on axis y (its largest force is that of gms)" in said
 
 
 # --- what a user gives ---------------------------------------------------------------------

@@ -119,21 +119,6 @@ def test_a_friction_is_planted_first_and_scaled_until_the_model_falls_short():
 # --- trials ----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow  # tests/identify/selection hides some
-@pytest.mark.parametrize("effect", ["cogging", "thermal_drift", "asymmetric_friction"])
-def test_what_is_planted_is_named_on_most_machines(effect):
-    """At 95 % right, fewer than four of five are one case in 50."""
-    assert sum(run(Case((effect,), 5.0, seed)).right for seed in range(1, 6)) >= 4
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_nothing_planted_nothing_named(seed):
-    found = run(Case((), 0.0, seed))
-    assert not found.answers
-    assert any(h.given for h in found.held)
-
-
 def in_small(*rivals: str) -> Setting:
     """Logs of 4 s at a low rate, and these effects beside the stage's own."""
     stage = load_model(STANDARD, CATALOGUE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +26,6 @@ from benchmarks.selftest.tally import (
 from benchmarks.selftest.trial import Answer, Held, TrialResult
 from benchmarks.selftest.words import (
     failure_in_words,
-    rate_in_words,
     target_in_words,
     trial_in_words,
 )
@@ -129,13 +127,6 @@ def test_a_name_counts_as_confident_from_where_one_acts_on_it():
     assert [counted(s) for s in (CONFIDENT - 0.01, CONFIDENT, 1.0)] == [0, 1, 1]
 
 
-def test_a_row_without_trials_is_left_out():
-    assert [r.what for r in rates([QUIET])] == [
-        "false findings, nothing planted", "90 % intervals that hold the truth, nothing missing",
-    ]  # fmt: skip
-    assert rates([HIDDEN]) == []
-
-
 def test_each_machine_is_in_the_stratum_of_its_variation():
     found = by_stratum(EVERY)
     assert set(found) == {"plain", "bumps"}
@@ -188,16 +179,6 @@ def test_a_rate_has_the_interval_of_its_binomial():
     for count, trials in ((0, 9), (3, 4), (31, 40), (12, 12)):
         exact = binomtest(count, trials).proportion_ci(0.95, "exact")
         assert Rate("", count, trials).interval == pytest.approx((exact.low, exact.high))
-
-
-def test_rates_in_words():
-    rate = Rate("what", 3, 4, (0.2, 0.9))
-    assert rate_in_words(rate) == (
-        "what: 3 of 4 (75 %, 95 % interval 19 to 99 %), target: 20 to 90 %"
-    )
-    assert rate_in_words(Rate("what", 0, 0)) == "what: 0 of 0"
-    assert math.isnan(Rate("what", 0, 0).value)
-    assert rate.value == 0.75
 
 
 def test_an_outcome_in_words():

@@ -18,7 +18,6 @@ from studies.thesis import (
     dynamic,
     future,
     models,
-    residuals,
     simulation,
     study,
     track,
@@ -40,24 +39,7 @@ def of_cable(x):
     return -(0.05 + 1.5 * x - 2.0 * x**2 + 8.0 * x**3)
 
 
-def test_what_was_found_is_measured_in_parts_of_what_was_planted() -> None:
-    r = study.recovered(-4.0, [-4.4, -4.0, -3.2], "N", -3.9)
-    assert r["mean"] == pytest.approx(-3.8666667)
-    assert r["error"] == pytest.approx(-1.0 / 30.0)
-    assert r["rms_error"] == pytest.approx(np.sqrt((0.1**2 + 0.2**2) / 3.0))
-    assert r["largest_error"] == pytest.approx(0.2)
-    assert r["sd"] == pytest.approx(np.sqrt((0.5333333**2 + 0.1333333**2 + 0.6666667**2) / 2.0))
-    assert (r["true"], r["unit"], r["printed"]) == (-4.0, "N", -3.9)
-    assert study.recovered(1.0, [3.0], "N")["sd"] == 0.0
-
-
 # --- the cable ------------------------------------------------------------------------------
-
-
-def test_smooth_forces_of_position_neither_repeat_nor_remember() -> None:
-    others = (fitted("constant_force"), fitted("cogging"), fitted("cable_hysteresis"))
-    axis = replace(STAGE, effects=(*STAGE.effects, *others))
-    assert [f.effect.name for f in study.of_position(axis)] == ["cable_slab", "constant_force"]
 
 
 def test_what_was_planted_is_read_from_the_log_at_the_positions_of_what_was_found() -> None:
@@ -85,64 +67,6 @@ def test_the_sine_carries_the_cable_at_its_place_without_feedback() -> None:
 
 
 # --- motions --------------------------------------------------------------------------------
-
-
-def test_a_motion_from_turn_to_turn_rests_in_each() -> None:
-    turns = np.array([0.0, 2.0, -1.0, 0.5])
-    x = behaviours.turning(turns)
-    leg = round(behaviours.LEG * behaviours.RATE)
-    assert len(x) == 3 * leg
-    np.testing.assert_allclose(x[::leg], turns[:-1])
-    np.testing.assert_allclose(x[leg // 2 :: leg], (turns[1:] + turns[:-1]) / 2.0)
-    np.testing.assert_allclose(x[leg - 1 :: leg], turns[1:], atol=1e-4)
-    assert np.all(np.sign(np.diff(x[:leg])) == 1.0)
-
-
-def test_the_speed_swings_about_its_mean_without_a_reversal() -> None:
-    mean, amplitude, hertz = behaviours.SWING
-    v = np.diff(behaviours.swing()) * behaviours.RATE
-    assert v.min() > 0.0
-    half, second = round(0.5 * behaviours.RATE), round(2.0 * behaviours.RATE)
-    np.testing.assert_allclose(v[: half - 1], np.linspace(0.0, mean, half, endpoint=False)[1:])
-    for i, f in enumerate(hertz):
-        part = v[half - 1 + i * second :][:second]
-        t = np.arange(second) / behaviours.RATE
-        np.testing.assert_allclose(part, mean + amplitude * np.sin(2 * np.pi * f * t), atol=1e-9)
-
-
-def test_each_triangle_of_force_begins_at_nothing_and_reaches_both_heights() -> None:
-    force, begin = behaviours.pushes(), 0
-    for period in behaviours.PUSHES:
-        part = force[begin : begin + round(period * behaviours.RATE)]
-        quarter = len(part) // 4
-        height = behaviours.PUSH * np.array([0.0, 1.0, 0.0, -1.0])
-        np.testing.assert_allclose(part[::quarter][:4], height, atol=1e-12)
-        np.testing.assert_allclose(np.abs(np.diff(part)), behaviours.PUSH / quarter)
-        begin += len(part)
-    assert begin == len(force)
-
-
-def test_the_steady_force_and_its_oscillation_rise_within_a_second() -> None:
-    steady, amplitude, hertz = behaviours.DRIFT
-    t = np.arange(round(4.0 * behaviours.RATE)) / behaviours.RATE
-    whole = steady + amplitude * np.sin(2.0 * np.pi * hertz * t)
-    force = behaviours.oscillation(4.0)
-    np.testing.assert_allclose(force[1000:], whole[1000:])
-    np.testing.assert_allclose(force[:1000], (t * whole)[:1000])
-
-
-def test_a_setpoint_along_positions_has_their_rates_and_one_of_force_none() -> None:
-    t = np.arange(400) / behaviours.RATE
-    found = behaviours.along(0.01 * np.sin(9.0 * t))
-    inner = slice(5, -5)
-    np.testing.assert_allclose(found.velocity[inner, 0], 0.09 * np.cos(9 * t)[inner], atol=1e-4)
-    np.testing.assert_allclose(
-        found.acceleration[inner, 0], -0.81 * np.sin(9 * t)[inner], atol=1e-3
-    )
-    assert not found.force.any()
-    pushed = behaviours.pushed(t)
-    np.testing.assert_allclose(pushed.force[:, 0], t)
-    assert not any(x.any() for x in (pushed.position, pushed.velocity, pushed.acceleration))
 
 
 def test_the_behaviours_are_what_they_say_and_lugre_has_its_traits() -> None:
@@ -204,13 +128,6 @@ def test_a_law_that_remembers_closes_its_inner_loop_and_dahls_does_not() -> None
     assert nested.gap == abs(nested.friction[3 * leg - 1] - nested.friction[8 * leg - 1])
 
 
-def test_a_friction_like_another_has_its_free_values_by_name() -> None:
-    known = {"Fc": 0.2, "Fs": 0.7, "n": 9.0, "other": 1.0}
-    values = models.like(CATALOGUE["stribeck"], known).values
-    start = Fitted.at_start(CATALOGUE["stribeck"]).values
-    assert {k: v for k, v in values.items() if v != start[k]} == {"Fc": 0.2, "Fs": 0.7}
-
-
 def test_random_starts_are_drawn_within_three_times_and_the_bounds() -> None:
     start, rng = study.friction_of(STAGE), np.random.default_rng(3)
     drawn = [models.drawn(start, rng).values for _ in range(60)]
@@ -225,22 +142,6 @@ def test_random_starts_are_drawn_within_three_times_and_the_bounds() -> None:
             if not p.at_least:  # as often less as more
                 assert np.median(values) == pytest.approx(first, rel=0.5)
     assert all(d["Fs"] >= d["Fc"] for d in drawn)
-
-
-def test_a_behaviour_in_which_the_machine_stands_still_does_not_count() -> None:
-    assert models.overall({"a": 1.25, "b": 3.0, "c": np.nan}) == pytest.approx(
-        np.sqrt((1.25**2 + 9.0) / 2.0)
-    )
-
-
-def test_free_values_of_the_planted_friction_stand_beside_those_found() -> None:
-    planted = replace(fitted("lugre", Fc=0.2, sigma2=0.1), fixed=frozenset({"n", "sigma1"}))
-    found = axis_of().with_effect(fitted("lugre", Fc=0.3, Fs=0.4))
-    told = residuals.beside_planted(planted, found)
-    assert not {"n", "sigma1"} & set(told)
-    assert (told["Fc"]["true"], told["Fc"]["mean"], told["Fc"]["unit"]) == (0.2, 0.3, "N")
-    assert told["Fs"]["mean"] == 0.4
-    assert residuals.beside_planted(planted, axis_of()) == {}
 
 
 def test_the_dry_part_of_the_drawn_friction_is_scaled_by_one_factor() -> None:
@@ -319,13 +220,6 @@ def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_know
     slower = replace(STAGE, hardware=replace(STAGE.hardware, velocity=0.05 / track.FASTEST))
     few = track.moves(TRACK.with_axis("x", slower), "x", 0.0, True, np.random.default_rng(0))
     assert list(few) == list(logs)[:-1]
-
-
-def test_a_trend_is_more_than_the_scatter_along_the_track() -> None:
-    where, scatter = np.linspace(-0.1, 0.1, 9), 1e-3 * np.array([1, -1, 1, -1, 1, -1, 1, -1, 1])
-    assert track.has_trend(where, 0.3 + 0.1 * where + scatter)
-    assert not track.has_trend(where, 0.3 + scatter)
-    assert not track.has_trend(where[:3], where[:3])  # too few to tell
 
 
 def test_the_level_that_a_machine_had_is_that_of_its_states() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from studies.thesis import cable, dynamic, models, residuals, simulation
+from studies.thesis import cable, dynamic, residuals
 
 
 def test_words_tell_the_number_of_their_entry() -> None:
@@ -27,39 +25,6 @@ def test_words_tell_the_number_of_their_entry() -> None:
     assert "0.06 N, 3.0 times the noise floor, and its residual is not white" in said[0]
     assert said[1] == "the diagnosis names nothing (nothing missing)"
     assert "0.021 N, 1.05 times the noise floor, and the residual is white" in said[2]
-
-
-def test_words_name_the_laws_and_parameters_that_stand_out() -> None:
-    laws = ("dahl", "gms", "lugre")
-    ratios = ((1.01, 5.3, 1.11), (31.0, 1.03, 2.3), (41.0, 7.1, 1.06))
-    by_law = {
-        law: {"loop_open_by": gap, "right_starts": right, "fit_time": 0.3, "step_time": 2e-8}
-        for law, gap, right in zip(laws, (0.017, 0.0, 0.023), (1.0, 0.5, 0.75), strict=True)
-    }
-    said = models.words({
-        "laws": laws, "by_law": by_law,
-        "error_over_noise_floor": {
-            machine: {law: {"map": r, "drift": np.nan} for law, r in zip(laws, row, strict=True)}
-            for machine, row in zip(laws, ratios, strict=True)
-        },
-        "traits": {"dahl": {"drift": 9e-5}, "gms": {"drift": -2e-6}, "lugre": {"drift": 8e-5}},
-    })  # fmt: skip
-    assert "1.1 times the noise floor or better; the nearest other is lugre" in said[0]
-    assert "a machine with gms, at 2.3 times; dahl is contained in lugre" in said[0]
-    assert said[1].startswith("an inner loop stays open with dahl, lugre, so")
-    assert "dahl and lugre drift, by up to 9e-05 m/s; the others by 2e-06 m/s" in said[2]
-    assert "75 % end within 1.2 times the noise floor; not all do with gms, lugre" in said[3]
-    found = {p: {"true": v, "mean": v, "sd": 0.0, "unit": "1", "error": e, "printed": v}
-             for p, v, e in zip(simulation.PRINTED, simulation.PRINTED.values(),
-                                (0, 0, -2e-3, 0, 1e-3, 0), strict=True)}  # fmt: skip
-    found["sigma2"]["true"] = 0.018
-    force = {p: np.array([i + 1.0]) for i, p in enumerate(("Fs", "v0", "Fc", "sigma2"))}
-    said = simulation.words({"parameters": found, "trials": 9, "snr_db": 60.0,
-                             "sensitivity": {"force_error": force}})  # fmt: skip
-    assert "9 trials at 60 dB none is further than 0.2 % from the planted value (v0)" in said[0]
-    assert said[1].endswith("sigma2 is furthest: -0.56 %")
-    assert said[2].endswith("most to sigma2, least to Fs")
-    assert len(said) == 3 + 6
 
 
 def test_words_tell_the_largest_error_of_the_places() -> None:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import cache
 from math import copysign, sin
 
-import mujoco
 import numpy as np
 import pytest
 from axis_runs import BOTH, Stepper
@@ -22,8 +21,6 @@ from twin.laws.verdict import LAWS, Law
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
-from twin.mujoco.callback import passive_callback
-from twin.simulator import MujocoSimulator
 
 STAGE = load_model("proton_xy", CATALOGUE)
 EVERY = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
@@ -90,30 +87,6 @@ def test_simulation_with_zero_strength_is_that_without(effect: Effect, stage: St
         for name in ("position", "force"):
             found = zero.axes[axis].columns[name]
             np.testing.assert_array_equal(found, wanted.columns[name], f"{axis} {name}")
-
-
-@EVERY
-def test_state_saved_and_restored_continues_to_the_bit(effect: Effect) -> None:
-    model = with_x(Fitted.at_start(effect, moderate(effect, np.random.default_rng(32))))
-    spec = mujoco.mjtState.mjSTATE_INTEGRATION
-    with passive_callback():
-        stage = MujocoSimulator(model, model.table())
-        saved, first, second = np.empty((3, mujoco.mj_stateSize(stage.model, spec)))
-
-        def step(begin: int, end: int) -> None:
-            for k in range(begin, end):
-                stage.data.ctrl[:] = 3.0 * sin(0.05 * k), 2.0 * sin(0.03 * k)
-                mujoco.mj_step(stage.model, stage.data)
-
-        step(0, 150)
-        mujoco.mj_getState(stage.model, stage.data, saved, spec)
-        step(150, 300)
-        mujoco.mj_getState(stage.model, stage.data, first, spec)
-        mujoco.mj_setState(stage.model, stage.data, saved, spec)
-        step(150, 300)
-        mujoco.mj_getState(stage.model, stage.data, second, spec)
-    np.testing.assert_array_equal(first, second)
-    assert not np.array_equal(first, saved)
 
 
 # --- planted faults: each law must fail on the effect that breaks it ------------------------------

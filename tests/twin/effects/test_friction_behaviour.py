@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from axis_runs import BOTH, Stepper, effect
 from axis_runs import pushed as pushed_at
-from friction_runs import RATE, along, friction, time
+from friction_runs import RATE, friction, time
 
 EACH = pytest.mark.parametrize("stage", BOTH)
 pushed = partial(pushed_at, rate=RATE)
@@ -50,18 +50,6 @@ def test_asymmetric_friction_sticks_on_its_strong_side() -> None:
         run = pushed(rng.uniform(1.0, 20.0), effects, force)
         assert np.ptp(run.x[10_000:]) < 1e-15
         assert run.x[-1] > 1e-3
-
-
-def test_stribeck_is_the_curve_of_modelicas_friction_example() -> None:
-    """Modelica Standard Library, MassWithStopAndFriction, with the values of Examples.Friction.
-
-    F_prop v + F_Coulomb + F_Stribeck exp(-fexp v) with 1 N s/m, 5 N, 10 N and 2 s/m.
-    """
-    fitted = friction("stribeck", Fc=5.0, Fs=15.0, v0=0.5, sigma2=1.0, n=1.0)
-    v = np.array([1e-6, 0.1, 0.5, 1.0, 3.0])
-    expected = 1.0 * v + 5.0 + 10.0 * np.exp(-2.0 * v)
-    np.testing.assert_allclose(along(fitted, v, 1e-4), expected, rtol=1e-12)
-    np.testing.assert_allclose(along(fitted, -v, 1e-4), -expected, rtol=1e-12)
 
 
 def breakaway(name: str, rate: float) -> float:

@@ -6,12 +6,13 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, with_all
+from effect_runs import CATALOGUE, FRICTIONS, with_all
 from mujoco.batch import Batch
 
+from twin.effect import Effect
 from twin.experiments.named import simulate
 from twin.model.file import load_model
-from twin.model.machine import MachineModel
+from twin.model.machine import Fitted, MachineModel
 from twin.mujoco.callback import passive_callback
 from twin.signals import Array
 from twin.simulator import MujocoSimulator
@@ -81,16 +82,21 @@ def test_looking_at_the_forces_changes_nothing_now_or_later(looks: int) -> None:
 # --- saved, restored, reset -----------------------------------------------------------------------
 
 
-def test_a_restored_snapshot_continues_to_the_bit(stage: MujocoSimulator) -> None:
-    step(stage, 0, 120)
-    snapshot = state(stage)
-    first = step(stage, 120, 400)
-    mujoco.mj_setState(stage.model, stage.data, snapshot, STATE)
-    np.testing.assert_array_equal(step(stage, 120, 400), first)
-    other = mujoco.MjData(stage.model)
-    mujoco.mj_setState(stage.model, other, snapshot, STATE)
-    stage.data = other
-    np.testing.assert_array_equal(step(stage, 120, 400), first)
+@pytest.mark.parametrize("friction", FRICTIONS, ids=lambda e: e.name)
+def test_a_restored_snapshot_continues_to_the_bit(friction: Effect) -> None:
+    axis = everything().axes["x"].with_effect(Fitted.at_start(friction))
+    with passive_callback():
+        model = everything().with_axis("x", axis)
+        stage = MujocoSimulator(model, model.table())
+        step(stage, 0, 120)
+        snapshot = state(stage)
+        first = step(stage, 120, 400)
+        mujoco.mj_setState(stage.model, stage.data, snapshot, STATE)
+        np.testing.assert_array_equal(step(stage, 120, 400), first)
+        other = mujoco.MjData(stage.model)
+        mujoco.mj_setState(stage.model, other, snapshot, STATE)
+        stage.data = other
+        np.testing.assert_array_equal(step(stage, 120, 400), first)
 
 
 def test_a_reset_starts_again(stage: MujocoSimulator) -> None:

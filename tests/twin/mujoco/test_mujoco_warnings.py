@@ -11,6 +11,7 @@ from threading import Barrier
 import mujoco
 import numpy as np
 import pytest
+from axis_runs import effect
 
 from twin.effect import OUT, Effect, Kind, Parameter, X
 from twin.errors import CannotRun
@@ -73,6 +74,26 @@ def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
         CannotRun, match=r"t = 0\.0000 s on axis y: effect test_mujoco_warnings gives nan N"
     ):
         run(machine({"a": nan}), ramp(), np.random.default_rng(0), simulator=simulator)
+
+
+@BOTH
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("largest", ["viscous_friction", "spring"])
+def test_a_loop_that_swings_up_is_told_with_its_axis_and_the_largest_force_there(
+    simulator: type, axis: str, largest: str
+) -> None:
+    """No force is beyond measure by itself: the loop is too fast for its rate."""
+    small = {"viscous_friction": {"c": 1e-3}, "spring": {"k1": 1e-3}}
+    parts = tuple(
+        effect(name, **{p: 1e5 * v if name == largest else v for p, v in values.items()})
+        for name, values in small.items()
+    )
+    fast = {n: 900.0 if n == axis else 20.0 for n in "xy"}
+    axes = {n: AxisModel(2.0, Hardware(bandwidth=fast[n]), parts) for n in "xy"}
+    model = MachineModel("two", axes, 1000.0)
+    said = rf"unstable at t = 0\.01\d+ s on axis {axis} \(its largest force is that of {largest}\)"
+    with pytest.raises(CannotRun, match=f"{said}; lower the bandwidth"):
+        run(model, ramp(), np.random.default_rng(0), simulator=simulator)
 
 
 def test_the_handler_of_warnings_is_given_back() -> None:
