@@ -39,6 +39,8 @@ class Columns:
     reading: Array
     net: Array
     acc: Array
+    load: Array
+    speeds: Array
 
     def __len__(self) -> int:
         return len(self.x)

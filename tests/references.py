@@ -271,6 +271,23 @@ def load_dependent_friction(p: Values, q: Columns) -> Results:
     return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
 
 
+@written_from("Fc, Fs -> Fc, Fs (1 + growth |load|)")
+def joint_load_friction(p: Values, q: Columns) -> Results:
+    return {DRY: q.dry + q.dry * np.sqrt((p["growth"] * q.load) ** 2)}
+
+
+@written_from("F = -(Fc sgn w + sigma2 w),  w = v + turns v_joint")
+def transmission_coupling(p: Values, q: Columns) -> Results:
+    """With joint 0 as the other one."""
+    both = np.stack([q.v, q.speeds], 1) @ [1.0, p["turns"]]
+    return {OUT: -p["Fc"] * np.sign(both) - p["sigma2"] * both}
+
+
+@written_from("F = -inertia a")
+def rotor_inertia(p: Values, q: Columns) -> Results:
+    return {OUT: -(p["inertia"] * q.acc)}
+
+
 @written_from("Fc, Fs -> (1 + P(x)) Fc, Fs;  P(x) = sum_k c_k cos(k pi (x - start)/length)")
 def position_dependent_friction(p: Values, q: Columns) -> Results:
     along = np.clip((q.x - p["start"]) / p["length"], 0.0, 1.0)

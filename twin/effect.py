@@ -51,7 +51,10 @@ WHEN = 17  # 1, instant of the result in the sample: 1 its end (stepping), 1/2 i
 MOVED = 18  # kg, moved mass of the axis
 NET = 19  # m/s^2, all forces on the axis but those of structure, over its moved mass
 ACC = 20  # m/s^2, absolute acceleration of the bodies on the axis
-IO_SIZE = 21
+LOAD = 21  # N, what the bodies of a mechanism take of this joint; zero on a plain axis
+SPEEDS = 22  # m/s, velocities of all joints of a mechanism in the order of its axes; else zero
+MOST_JOINTS = 64
+IO_SIZE = SPEEDS + MOST_JOINTS
 COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the weight of each
 
 Law = Callable[[Any, Any, Any], None]
@@ -161,8 +164,8 @@ class Effect:
     attach: Callable[[Any, Mapping[str, float]], None] | None = None
     """Of a structure effect: builds its bodies in MuJoCo, given a twin.mujoco.mjcf.Mount and the
     values by name. Its first two states are position (m) and speed (m/s) of the joint built."""
-    added_mass: Callable[[Mapping[str, float]], float] | None = None
-    """Values by name -> what the effect adds to the moved mass, as a part of it (1)."""
+    added_mass: Callable[[Mapping[str, float], float], float] | None = None
+    """(values by name, moved mass in kg) -> what the effect adds to the moved mass, kg."""
     sticks: bool = False
     """Whether it is a friction that holds the axis at rest with any force up to a level."""
     simplest: Callable[[Mapping[str, float]], dict[str, float]] | None = None
@@ -192,6 +195,10 @@ class Effect:
     suits: Callable[[Collection[Effect], bool], bool] | None = None
     """(effects that an axis has, whether it turns) -> whether a diagnosis offers this one there,
     and not the same law by another name; None: always."""
+
+    of_joints: bool | None = None
+    """Whether a diagnosis offers it on joints of a mechanism alone (True) or on plain axes alone
+    (False), as what it is there is known from the bodies; None: on both."""
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parameters]

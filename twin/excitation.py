@@ -35,6 +35,9 @@ class Excitation:
     thrust_pitches: tuple[float, ...] = ()
     """The same of the motor's force in proportion to it, m."""
 
+    other_joints: tuple[float, ...] = ()
+    """Numbers of a mechanism's other joints, in the order of its axes; none of a plain axis."""
+
     @property
     def travel(self) -> float:
         """Distance covered, m."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from identify.dataset.motion import Bodies
 from identify.dataset.velocity import together
 from twin.errors import InputError
 from twin.logs import Log
@@ -19,12 +20,11 @@ SMOOTHED = 0.02  # s, over which a position is a parabola that tells its velocit
 FEWEST = 5  # samples of it
 
 
-def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Array]:
-    """Of each axis that is a joint (2, n): momentum beyond mass x velocity, and force, SI units.
+def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
+    """What the bodies take of each axis that is a joint; none for a machine of plain axes.
 
-    Between the samples of the log: the force residual of a joint is command - force - d/dt(mass x
-    velocity + momentum). Empty for a machine of plain axes. name: of the log. Raises InputError
-    where the log lacks one of the joints.
+    The force residual of a joint is command - force - d/dt(mass x velocity + momentum). name: of
+    the log. Raises InputError where the log lacks one of the joints.
     """
     if not model.joints:
         return {}
@@ -41,12 +41,17 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Array]:
     position = np.stack(
         [together(a.position, a.columns.get("velocity"), log.period).position for a in told]
     )
-    samples = min(max(round(SMOOTHED / log.period), FEWEST), position.shape[1]) // 2 * 2 - 1
+    samples = min(max(round(SMOOTHED / log.period), FEWEST), position.shape[1] - 1)
+    samples -= 1 - samples % 2
     smooth = local_parabola(position, samples, derivative=1, period=log.period)
-    velocity = between(position, log.period)
-    momentum, force = mechanism.along(_middle(position), velocity, _middle(smooth))
+    velocity, speeds = between(position, log.period), _middle(smooth)
+    momentum, force = mechanism.along(_middle(position), velocity, speeds)
+    load = force + local_parabola(momentum, samples, derivative=1, period=log.period)
     momentum -= mechanism.inertia[:, None] * velocity
-    return {a: np.stack([momentum[i], force[i]]) for i, a in enumerate(mechanism.axes)}
+    return {
+        axis: Bodies(momentum[i], force[i], load[i], speeds, i)
+        for i, axis in enumerate(mechanism.axes)
+    }
 
 
 def _middle(signals: Array) -> Array:

@@ -43,7 +43,15 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         lines=lines(heard),
         ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
         resolution=max(m.resolution for m in motions),
+        other_joints=_other_joints(motions[0]),
     )
+
+
+def _other_joints(motion: Motion) -> tuple[float, ...]:
+    """Numbers of the other joints of a mechanism."""
+    if motion.bodies is None:
+        return ()
+    return tuple(float(j) for j in range(len(motion.bodies.speeds)) if j != motion.bodies.index)
 
 
 def _heads(motions: Sequence[Motion]) -> list[Motion]:

@@ -32,6 +32,27 @@ class OtherAxis:
     units: AxisUnits
 
 
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """What the bodies of a mechanism take of one of its joints, (n,) each between a log's samples.
+
+    momentum: N s, beyond mass x velocity. force: N, what they take beyond the change of momentum.
+    load: N, all that they take, smoothed. speeds (n_axes, n): m/s, smoothed, of all joints; index:
+    which of them this one is.
+    """
+
+    momentum: Array
+    force: Array
+    load: Array
+    speeds: Array
+    index: int
+
+    def during(self, samples: slice) -> Bodies:
+        """The same of some samples."""
+        momentum, force, load = (a[samples] for a in (self.momentum, self.force, self.load))
+        return Bodies(momentum, force, load, self.speeds[:, samples], self.index)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Motion of one axis over one log, in blocks.
@@ -46,9 +67,8 @@ class Motion:
     more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
     readings (identify.dataset.velocity); 0 where there is none. ripples: m, periods at which the
     readings err along the track (identify.dataset.reading_ripple). ahead: s, by which the command
-    was moved ahead of how it was logged. bodies (2, n * samples a block): of a joint of a mechanism
-    the momentum beyond mass x velocity and the force that its bodies take beyond the change of that
-    momentum (identify.dataset.bodies); None for a plain axis, which has neither.
+    was moved ahead of how it was logged. bodies: of a joint of a mechanism, over as many samples as
+    raw; None for a plain axis, whose mass is all that it moves.
     """
 
     name: str
@@ -68,7 +88,7 @@ class Motion:
     velocity_weight: float = 0.0
     ripples: tuple[float, ...] = ()
     ahead: float = 0.0
-    bodies: Array | None = None
+    bodies: Bodies | None = None
 
     def __repr__(self) -> str:
         return (
@@ -98,7 +118,7 @@ class Motion:
             signals=np.ascontiguousarray(self.signals[:, blocks]),
             others=np.ascontiguousarray(self.others[:, blocks]),
             raw=np.ascontiguousarray(self.raw[:, slice(*ends)]),
-            bodies=None if self.bodies is None else self.bodies[:, slice(*ends)],
+            bodies=None if self.bodies is None else self.bodies.during(slice(*ends)),
             beside={a: replace(o, signals=o.signals[:, blocks]) for a, o in self.beside.items()},
         )
 
@@ -142,20 +162,32 @@ class Motion:
     @property
     def force(self) -> Array:
         """Command less the bias force of a mechanism's bodies, N at the log's own rate."""
-        return self.raw[1] if self.bodies is None else self.raw[1] - self.bodies[1]
+        return self.raw[1] if self.bodies is None else self.raw[1] - self.bodies.force
 
     def momentum(self, mass: float, velocity: Array) -> Array:
         """Of a mass (kg) at a velocity (n,) m/s, and of a mechanism's bodies beyond it, N s."""
         own = mass * velocity
-        return own if self.bodies is None else own + self.bodies[0]
+        return own if self.bodies is None else own + self.bodies.momentum
 
     @cached_property
     def net(self) -> Array:
         """Command less what a mechanism's bodies take beyond mass x acceleration, (n,) N."""
         if self.bodies is None:
             return self.command
-        momentum, force = self.bodies.reshape(2, len(self.command), -1).mean(axis=2)
+        momentum, force = self._block_means(np.stack([self.bodies.momentum, self.bodies.force]))
         return np.asarray(self.command - force - rate(momentum, self.period))
+
+    @property
+    def joint_signals(self) -> Array:
+        """The signals, and of a joint its load N and the speeds of all joints, (4 + n_axes, n)."""
+        if self.bodies is None:
+            return self.signals
+        more = self._block_means(np.vstack([self.bodies.load, self.bodies.speeds]))
+        return np.vstack([self.signals[:3], more])
+
+    def _block_means(self, signals: Array) -> Array:
+        """Signals (k, n * samples a block) as means over the blocks (k, n)."""
+        return np.asarray(signals.reshape(len(signals), len(self.command), -1).mean(axis=2))
 
     def at_samples(self, instant: float) -> Array:
         """Position m, velocity m/s and command N at the log's own rate, (3, n).

@@ -100,7 +100,7 @@ def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     for noise, log in zip(noises_of(axis, motions), logs, strict=True):
         own = unrounded(noise, log.motion).reading / (2.0 * log.motion.sample_period)
         parts.append(rounding_variance(log, sticks(axis), noise.segment, own))
-    return axis.mass * together(parts, motions)
+    return axis.weighed.mass * together(parts, motions)
 
 
 def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
@@ -158,7 +158,7 @@ def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
 
 def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     """The measurement noise of one log, from its raw residual."""
-    dt = motion.sample_period
+    axis, dt = axis.weighed, motion.sample_period
     velocity = motion.unrippled
     # Noise in the command moves the axis as well; without the actuator's delay the two would not
     # cancel and would look like measurement noise.

@@ -21,7 +21,7 @@ from identify.dataset.given_logs import (
     require_one_kind,
     require_samples,
 )
-from identify.dataset.motion import Motion
+from identify.dataset.motion import Bodies, Motion
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.reading_ripple import ripples_of_widest
 from identify.dataset.recorded_motion import LONGEST_BLOCK, motion_of
@@ -31,7 +31,6 @@ from twin.logs import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import spread
-from twin.signals import Array
 
 MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
 LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
@@ -86,7 +85,7 @@ def _of_axis(
     name: str,
     going: Given,
     test_function: float | None,
-    bodies: Mapping[str, Array],
+    bodies: Mapping[str, Bodies],
 ) -> Dataset:
     """The dataset of one axis from the logs in which it moves; test logs decide nothing of it.
 
@@ -167,7 +166,7 @@ def _motions(
     axis: str,
     machine: tuple[str, ...],
     ripples: tuple[float, ...],
-    bodies: Mapping[str, Array],
+    bodies: Mapping[str, Bodies],
     longest: float,
 ) -> tuple[list[Motion], ...]:
     """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""

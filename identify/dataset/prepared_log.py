@@ -60,7 +60,7 @@ class PreparedLog:
         acceleration = fine.acceleration(motion.raw[0])
         command = fine.mean(motion.force)
         if motion.bodies is not None:
-            command -= fine.acceleration(motion.bodies[0])
+            command -= fine.acceleration(motion.bodies.momentum)
         return cls(motion, test_function, fine, command, acceleration, reach=reach)
 
     @property
@@ -96,8 +96,9 @@ def total_forces(table: Table, sets: Array, motion: Motion) -> Array:
     totals = np.zeros((len(sets), motion.signals.shape[1]))
     first, last, _, _, _ = table.axes[0]
     if first < last:
+        signals = motion.joint_signals if table.reads_joints else motion.signals
         walk_sets(
-            table.entries, first, last, sets, table.n_states, motion.signals, motion.others,
+            table.entries, first, last, sets, table.n_states, signals, motion.others,
             motion.period, 0, totals, table.masses[0], motion.time_origin,
         )  # fmt: skip
     return totals

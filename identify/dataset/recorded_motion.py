@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.dataset.motion import Motion, OtherAxis
+from identify.dataset.motion import Bodies, Motion, OtherAxis
 from identify.dataset.reading_ripple import ripple, ripple_periods
 from identify.dataset.velocity import together
 from twin.errors import InputError
@@ -18,7 +18,7 @@ from twin.signals import Array, between, rate, white_noise
 SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
-SHORTEST_LOG = 1.0  # s
+SHORTEST_LOG = 0.5  # s, a few test functions
 FEWEST_SAMPLES = 64  # of a log; more than those of 1 s where they are slow
 EQUAL = 1e-9  # relative difference by which whole samples may miss a length
 FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
@@ -31,13 +31,13 @@ def motion_of(
     machine: Sequence[str] = (),
     longest_block: float = LONGEST_BLOCK,
     ripples: tuple[float, ...] | None = None,
-    bodies: Array | None = None,
+    bodies: Bodies | None = None,
 ) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
-    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies
-    (2, n): of a joint, as ``bodies_along`` gives them.
+    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies:
+    of a joint.
     Raises InputError where the axis is not in the log, does not move, or is too short.
     """
     if axis not in log.axes:
@@ -77,7 +77,7 @@ def motion_of(
         follows=_follows(log.axes[axis]),
         velocity_weight=told.weight,
         ripples=ripples,
-        bodies=None if bodies is None else bodies[:, : block * signals.shape[1]],
+        bodies=None if bodies is None else bodies.during(slice(block * signals.shape[1])),
     )
 
 

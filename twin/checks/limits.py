@@ -114,7 +114,7 @@ ALIKE_SETPOINT = 0.98  # correlation of a position and the setpoint that it foll
 
 # What a fit needs
 
-SHORTEST = 1.0  # s, least duration for identification
+SHORTEST = 0.5  # s, least duration for identification
 COARSE = 0.3  # acceleration noise as a part of the acceleration
 ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does not average out
 ROUNDING = 1.0  # noise of rounding is at most its step

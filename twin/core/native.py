@@ -254,6 +254,8 @@ class Table:
     """How many states there are."""
     labels: tuple[tuple[str, str], ...]
     """(axis name, effect name) of each entry."""
+    reads_joints: bool = False
+    """Whether a law reads the load or the velocities of a mechanism's joints."""
 
 
 def build_table(
@@ -284,4 +286,9 @@ def build_table(
         masses=np.array(masses, dtype=float),
         n_states=n_states,
         labels=tuple(labels),
+        reads_joints=any(
+            effect.reads("LOAD") or effect.reads("SPEEDS")
+            for effects in axes.values()
+            for effect, _ in effects
+        ),
     )

@@ -22,10 +22,12 @@ from twin.effect import (
     HOLD,
     INDEX,
     IO_SIZE,
+    LOAD,
     MASS,
     MOVED,
     OUT,
     READING,
+    SPEEDS,
     STATIC,
     TIME,
     V_OTHER,
@@ -42,6 +44,8 @@ from twin.effect import (
 Array = NDArray[np.float64]
 Entries = NDArray[np.int64]
 
+LOAD_ROW = 3  # of a joint's motion; the velocities of all joints follow
+
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
 _STRUCTURE = Kind.STRUCTURE.value
@@ -54,8 +58,9 @@ def walk(
 ) -> None:  # fmt: skip
     """Forces along a measured motion: the laws stepped over every sample from ``begin`` on.
 
-    motion (3, n): position m, velocity m/s, command N; others (3, n): position, velocity,
-    acceleration of the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
+    motion (3, n): position m, velocity m/s, command N; of a joint also its load N and the
+    velocities of all joints (4 + n_axes, n). others (3, n): position, velocity, acceleration of
+    the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
     The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
     that holds a measured axis at rest is not determined.
     rows (n_entries, n): N.
@@ -114,6 +119,10 @@ def _arrive(io, motion, others, k, begin, dt, time_origin):
     io[X_OTHER] = others[0, k]
     io[V_OTHER] = others[1, k]
     io[A_OTHER] = others[2, k]
+    if motion.shape[0] > LOAD_ROW:
+        io[LOAD] = motion[LOAD_ROW, k]
+        for j in range(motion.shape[0] - LOAD_ROW - 1):
+            io[SPEEDS + j] = motion[LOAD_ROW + 1 + j, k]
 
 
 @compiled(nogil=True)

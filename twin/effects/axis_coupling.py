@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter("damping", "N s/m", 0.0, -MOST, MOST, "coupling damping", strength=True),
     ),
     law=law,
+    of_joints=False,
     fingerprint="residual follows the acceleration or speed of the other axis, also at rest",
     excited_by="moves of the other axis alone, and of both axes with different timing",
 )

@@ -60,6 +60,7 @@ EFFECT = Effect(
     ),
     states=("displacement", "speed"),
     law=law,
+    of_joints=False,
     attach=attach,
     fingerprint="residual swings at a few hertz after every acceleration, also at rest",
     excited_by="fast moves with pauses of a second between them",

@@ -34,6 +34,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    of_joints=False,
     fingerprint="residual opposes motion where motor force or the other axis' acceleration is high",
     excited_by="fast moves of both axes at once, with the other axis at both ends of its travel",
 )  # fmt: skip

@@ -11,8 +11,8 @@ def law(p, s, io):
     io[OUT] = -p[0] * io[MOVED] * io[ACC]
 
 
-def added_mass(values):
-    return values["ratio"]
+def added_mass(values, mass):
+    return values["ratio"] * mass
 
 
 EFFECT = Effect(
@@ -27,6 +27,7 @@ EFFECT = Effect(
     ),
     law=law,
     added_mass=added_mass,
+    of_joints=False,
     fingerprint="residual is proportional to acceleration, everywhere and in both directions",
     excited_by="moves with strong acceleration, on an axis whose nominal mass is held",
 )  # fmt: skip

@@ -15,6 +15,7 @@ from twin.importers.clock import Clock, clock_of, even_times, rate_of
 from twin.importers.formats import read_hdf5, read_json, read_mat, read_parquet, read_tdms
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, numbers
+from twin.importers.transmission import at_joints
 from twin.logs.container import reading
 from twin.logs.log import Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
@@ -148,7 +149,8 @@ def _log(
             "correct them in the map"
         )
     metadata = {"source": "import", "import_map": mapping.text, **facts}
-    return Log(rate, _axes(mapping, columns, span), metadata)
+    gears = {name: axis.gear for name, axis in mapping.axes.items() if axis.gear}
+    return Log(rate, at_joints(_axes(mapping, columns, span), gears), metadata)
 
 
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:

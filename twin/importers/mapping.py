@@ -6,6 +6,7 @@
     force_constant = 53.4                 # N/A, optional
     position = {column = "qm", unit = "mm"}
     force = {column = "drive", unit = "V", scale = 35.15}     # N a volt
+    gear = {x = 32.0}                     # the columns are those of a motor, 32 turns for one
 
 Several files are given in the order of [[files]] tables, each with time or sample_rate and an
 offset (s) that is added to its times; a column of the second one says file = 2.
@@ -109,6 +110,11 @@ class AxisMap(Entries):
     force_constant: float | None = Field(
         None, gt=0.0, description="a number above 0, in N/A (N m/A on a rotary axis)"
     )
+    gear: dict[str, float] | None = Field(
+        None, min_length=1,
+        description="turns of this axis' motor, whose signals are mapped, for one of each joint, "
+        "such as {elbow = 32.0, wrist = 32.0}; the log then has the signals of the joints",
+    )  # fmt: skip
     setpoint_position: ColumnMap | None = _SIGNAL
     setpoint_velocity: ColumnMap | None = _SIGNAL
     setpoint_acceleration: ColumnMap | None = _SIGNAL

@@ -17,8 +17,10 @@ from twin.effect import (
     HOLD,
     INDEX,
     IO_SIZE,
+    LOAD,
     MASS,
     READING,
+    SPEEDS,
     STATIC,
     TIME,
     V_OTHER,
@@ -78,7 +80,7 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     table = axis_table({"x": AxisModel(1.0, effects=tuple(effects))})
     rows = np.zeros((len(table.entries), len(motion)))
     first, last, state, _, _ = table.axes[0]
-    signals = np.stack([motion.x, motion.v, motion.u])
+    signals = np.stack([motion.x, motion.v, motion.u, motion.u, motion.v])  # load, another joint
     walk(
         table.entries, first, last, table.parameters, np.zeros(table.n_states), state, signals,
         signals, motion.dt, 0, rows, 1.0, 0.0,
@@ -96,6 +98,7 @@ def sampled(motion: Motion) -> Array:
     io[:, [DRY, STATIC, VISCOUS]] = 1.0
     io[:, HOLD] = motion.v / motion.dt + motion.u
     io[:, READING] = motion.x
+    io[:, LOAD], io[:, SPEEDS] = motion.u, motion.v
     io[:, WHEN] = 1.0
     return io
 

@@ -203,10 +203,17 @@ class AxisModel:
         return self.mass == 0.0
 
     def can_have(self, effect: Effect) -> bool:
-        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis."""
+        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis.
+
+        What a joint's drive does to the command is asked beside its rotor's inertia, whose torque
+        a lag or a limit would imitate where the bodies are light.
+        """
+        if effect.kind is Kind.ACTUATION and self.joint is not None and self.weighed is self:
+            return False
         present = [f.effect for f in self.effects]
         suits = effect.suits is None or effect.suits(present, self.rotary)
-        return suits and self._moves_with(effect)
+        here = effect.of_joints in (None, self.joint is not None)
+        return here and suits and self._moves_with(effect)
 
     def _moves_with(self, effect: Effect) -> bool:
         """Whether the effect acts on this axis at all: imposed motion has no motor and no mass.
@@ -237,6 +244,14 @@ class AxisModel:
 
     def __getitem__(self, effect: str) -> Fitted:
         return next(f for f in self.effects if f.effect.name == effect)
+
+    @property
+    def weighed(self) -> AxisModel:
+        """The same with what effects add to the moved mass in the mass, and without these."""
+        adding = [(f, f.effect.added_mass) for f in self.effects if f.effect.added_mass]
+        added = sum(add(f.values, self.mass) for f, add in adding)
+        kept = tuple(f for f in self.effects if not f.effect.added_mass)
+        return replace(self, mass=self.mass + added, effects=kept) if adding else self
 
     def parameter_units(self, effect: str) -> dict[str, str]:
         """Units of the parameters of an effect of this axis, by name."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
 # A joint of its own: no limits, whatever the defaults of the machine's file.
@@ -180,7 +180,7 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
             carried[name] = _set_inertia(model, spec, name)
             continue
         inside = sum(m for other, m in carried.items() if _carries(joint.parent, other))
-        moved = model.axes[name].mass + _added_mass(model.axes[name])
+        moved = model.axes[name].weighed.mass
         if moved - inside <= 0:
             raise InputError(
                 f"axis {name}: mass {moved:g} kg is not above the {inside:g} kg of "
@@ -200,12 +200,6 @@ def attached_joint(axis: str, effect: str) -> str:
     return f"{effect}_{axis}"
 
 
-def _added_mass(axis: AxisModel) -> float:
-    """What the effects add to the moved mass, kg."""
-    parts = [f.effect.added_mass(f.values) for f in axis.effects if f.effect.added_mass]
-    return axis.mass * sum(parts)
-
-
 def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
     """Give the body of a rotary axis its moment of inertia about the hinge; its mass, kg.
 
@@ -221,7 +215,7 @@ def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
     mass = float(spec.compile().body(joint.parent.name).mass[0]) if model.mjcf else 1.0
     body = joint.parent
     body.mass, body.ipos, body.explicitinertial = mass, joint.pos, True
-    body.inertia = [axis.mass + _added_mass(axis)] * 3
+    body.inertia = [axis.weighed.mass] * 3
     return mass
 
 

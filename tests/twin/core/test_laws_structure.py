@@ -28,6 +28,7 @@ CABLE = effect("cable_slab", offset=0.6, k1=7.0, k2=-3.0)
 DEADBAND = effect("actuator_deadband", width=0.35)
 PARTS = {
     "payload_mass": effect("payload_mass", ratio=0.43),
+    "rotor_inertia": effect("rotor_inertia", inertia=0.43 * MASS),
     "flexible_mode": effect("flexible_mode", load=0.23, frequency=31.0, damping=0.07),
     "backlash": effect("backlash", load=0.17, play=4e-5, frequency=83.0, damping=0.2),
     "base_vibration": effect("base_vibration", recoil=0.29, frequency=6.1, damping=0.11),
@@ -136,8 +137,8 @@ def test_momentum_of_all_parts_is_the_impulse_from_outside(
     momentum = MASS * (run.v + base)
     for name in names:
         values = PARTS[name].values
-        if name == "payload_mass":
-            momentum += values["ratio"] * MASS * (run.v + base)
+        if name in ("payload_mass", "rotor_inertia"):
+            momentum += values.get("inertia", values.get("ratio", 0.0) * MASS) * (run.v + base)
         elif name != "base_vibration":  # its own part of the mass moves with the axis and swings
             momentum += values["load"] * MASS * np.r_[0.0, run.states[f"{name}_speed"][:-1]]
     impulse = np.r_[0.0, np.cumsum(outside)[:-1]] * H
@@ -179,7 +180,9 @@ def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) 
     """Blocks of eight samples of a smooth run: their mean speeds tell the mean forces."""
     t = np.arange(4000) * H
     force = 9.0 * np.sin(2.0 * np.pi * 9.0 * t) * np.sin(2.0 * np.pi * 0.7 * t) ** 2
-    parts = tuple(p for n, p in PARTS.items() if n in names and n != "backlash")
+    parts = tuple(
+        p for n, p in PARTS.items() if n in names and n not in ("backlash", "rotor_inertia")
+    )
     run = pushed(MASS, parts, force)
     block = 8
     mean = 0.5 * (run.v[1:] + run.v[:-1])[:3992].reshape(-1, block).mean(axis=1)
@@ -199,6 +202,7 @@ CONTINUOUS = {
     "base_vibration": {"recoil": 0.2, "frequency": 5.0, "damping": 0.1},
     "backlash": {"load": 0.3, "play": 2e-3, "frequency": 25.0, "damping": 0.1},
     "payload_mass": {"ratio": 0.4},
+    "rotor_inertia": {"inertia": 0.4 * MASS},
 }
 
 
@@ -210,8 +214,9 @@ def shaken(t: Array | float) -> Array | float:
 def equations(name: str) -> Callable[[float, Array], tuple]:
     """Right side of the continuous equations of position, attached displacement and speeds."""
     p = CONTINUOUS[name]
-    if name == "payload_mass":
-        return lambda t, z: (z[2], 0.0, shaken(t) / (MASS * (1.0 + p["ratio"])), 0.0)
+    if name in ("payload_mass", "rotor_inertia"):
+        moved = MASS * (1.0 + p["ratio"]) if name == "payload_mass" else MASS + p["inertia"]
+        return lambda t, z: (z[2], 0.0, shaken(t) / moved, 0.0)
     w, share = 2.0 * np.pi * p["frequency"], p.get("load", p.get("recoil"))
 
     def right(t: float, z: Array) -> tuple:
@@ -248,7 +253,9 @@ def test_it_converges_to_the_continuous_equations(name: str, stage: Stepper) -> 
     coarse, fine = error(2000.0), error(8000.0)
     assert fine < 1e-4 * np.ptp(exact)
     assert fine < 0.4 * coarse or coarse < 1e-9 * np.ptp(exact)
-    off = {p: 1.1 * v for p, v in CONTINUOUS[name].items() if p in ("frequency", "ratio")}
+    off = {
+        p: 1.1 * v for p, v in CONTINUOUS[name].items() if p in ("frequency", "ratio", "inertia")
+    }
     assert error(8000.0, **off) > 4.0 * fine, "blind"
 
 

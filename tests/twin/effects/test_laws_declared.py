@@ -15,7 +15,9 @@ from twin.effect import Effect, Kind, Parameter, V
 from twin.model.units import Scale, has_size
 
 PARAMETERS = [(e, p) for e in CATALOGUE.values() for p in e.parameters]
-PLACES_AND_TIMES = ("start", "middle", "low", "high", "phase", "tau", "relaxation", "b", "n")
+PLACES_AND_TIMES = (
+    "start", "middle", "low", "high", "phase", "tau", "relaxation", "b", "n", "turns", "joint",
+)  # fmt: skip
 
 
 def test_bounds_follow_from_what_a_parameter_is() -> None:

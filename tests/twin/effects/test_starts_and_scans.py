@@ -26,7 +26,7 @@ def scaled(e: Excitation, force: float, length: float, time: float) -> Excitatio
         length * e.position_low, length * e.position_high, length / time * e.speed_max,
         force * e.dry_level, time * e.duration, time * e.period, force * e.force_max,
         tuple(f / time for f in e.lines), tuple(length * r for r in e.ripples),
-        length * e.resolution,
+        length * e.resolution, other_joints=e.other_joints,
     )  # fmt: skip
 
 
@@ -60,6 +60,7 @@ def test_a_start_rule_follows_the_units_of_the_log(name: str) -> None:
 # Scans that try fixed times and ratios.
 ABSOLUTE = {
     "backlash-frequency", "dwell_stiction-time", "base_vibration-damping", "flexible_mode-damping",
+    "transmission_coupling-joint", "transmission_coupling-turns",
 }  # fmt: skip
 OWN = {"base_vibration-frequency", "flexible_mode-frequency", "encoder_ripple-period"}
 

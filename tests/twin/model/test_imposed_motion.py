@@ -72,7 +72,7 @@ def test_what_needs_a_mass_or_a_motor_is_refused_and_never_tried(logs) -> None:
     for effect in CATALOGUE.values():
         through_motor = effect.kind in (Kind.ACTUATION, Kind.SENSING, Kind.STRUCTURE)
         acts = not through_motor and not effect.reads("U")
-        assert axis.can_have(replace(effect, suits=None)) == acts
+        assert axis.can_have(replace(effect, suits=None, of_joints=None)) == acts
     for name in ("payload_mass", "load_dependent_friction", "actuator_lag"):
         with pytest.raises(InputError, match=f"{name} acts through .* imposed"):
             axis.with_effect(Fitted.at_start(CATALOGUE[name]))
