@@ -216,7 +216,7 @@ def test_a_log_without_samples_is_refused_in_one_line_in_any_role(role):
     given = {"logs": {"run": run}, "holdout": {}, "test": {}}
     given[role] = {**given[role], "none": run.part(0, 0)}
     told = one_line(datasets, STAGE, **given)
-    assert told.startswith("none: has no samples; identification needs 1 s in which an axis moves")
+    assert told.startswith("none: has no samples; identification needs 0.5 s in which an axis moves")
     told = one_line(first_model, {"none": run.part(0, 0)}, "new", CATALOGUE)
     assert told.startswith("none: has no samples")
 
@@ -275,7 +275,7 @@ def test_standstill_is_the_same_to_check_and_fit_and_told(kind):
 
 def test_a_log_too_short_to_show_motion_is_told_by_its_length():
     short = {"a": logged(STAGE, seconds=0.2)}
-    with pytest.raises(InputError, match=r"last 0\.2 s at most, identification needs 1 s"):
+    with pytest.raises(InputError, match=r"last 0\.2 s at most, identification needs 0.5 s"):
         datasets(PLAIN, short, {})
     other = MachineModel("s", {"z": PLAIN.axes["x"]}, RATE)
     with pytest.raises(InputError, match=r"\(z\) is in the logs, which have x; name the axes"):

@@ -196,8 +196,8 @@ CASES = {
                       "there is one speed only, 0.2 m/s, "),
     "one rotary speed": Case(spread(ROTARY_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
                              "there is one speed only, 0.2 rad/s, "),
-    "too short": Case(lambda s: drive(seconds=s), [1.0, 1.001], 0.999, Fault.TOO_SHORT,
-                      "the log lasts 0.999 s, a fit needs 1 s", severity=ERROR),
+    "too short": Case(lambda s: drive(seconds=s), [0.5, 0.501], 0.499, Fault.TOO_SHORT,
+                      "the log lasts 0.499 s, a fit needs 0.5 s", severity=ERROR),
     **{f"at {31 * sign:g} N, {rate:g} Hz": Case(
         held_at(rate, sign, fewest), [fewest - 1], fewest, Fault.SATURATION,
         f"at its extreme of {31 * sign:g} N for {2 * fewest / rate:.3g} s in all", None,
