@@ -30,11 +30,12 @@ EFFECT = Effect(
         ),
         Parameter(
             "joint", "1", 0.0, 0.0, MOST_JOINTS - 1.0, "number of the other joint, from 0",
-            fixed=True, scan=lambda e: e.other_joints,
+            fixed=True, scan=lambda e: e.other_joints or (0.0,),
         ),
     ),
     law=law,
     of_joints=True,
+    is_itself=lambda values, e: values["joint"] in e.other_joints,
     fingerprint="residual steps where the sum of two joints' speeds changes its sign",
     excited_by="moves of the two joints at different times, with reversals of each",
 )  # fmt: skip

@@ -216,7 +216,9 @@ def test_a_log_without_samples_is_refused_in_one_line_in_any_role(role):
     given = {"logs": {"run": run}, "holdout": {}, "test": {}}
     given[role] = {**given[role], "none": run.part(0, 0)}
     told = one_line(datasets, STAGE, **given)
-    assert told.startswith("none: has no samples; identification needs 0.5 s in which an axis moves")
+    assert told.startswith(
+        "none: has no samples; identification needs 0.5 s in which an axis moves"
+    )
     told = one_line(first_model, {"none": run.part(0, 0)}, "new", CATALOGUE)
     assert told.startswith("none: has no samples")
 
