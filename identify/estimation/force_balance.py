@@ -264,8 +264,12 @@ def _apparent_forces(sensing: Sequence[AxisModel], effect: str, log: PreparedLog
 
 
 def _by_mass(axis: AxisModel, steps: Array, log: PreparedLog) -> Array:
-    """Change (m, n) N by the moved mass, to which attached masses and sensing errors scale."""
+    """Change (m, n) N by the moved mass, to which sensing errors and most attached masses scale."""
     attached = parts_of(axis, Kind.STRUCTURE, Kind.SENSING)
+    alike = (
+        f for f in attached.effects if f.effect.kind is Kind.SENSING or f.effect.reads("MOVED")
+    )
+    attached = replace(attached, effects=tuple(alike))
     return np.asarray(steps * (averaged_force(attached, [log]) / axis.mass - log.acceleration))
 
 
