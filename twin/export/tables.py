@@ -139,11 +139,8 @@ def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTab
     forwards, backwards = (
         np.array([np.mean(_pass(passed, few, way * v) - own) for v in runs]) for way in (1.0, -1.0)
     )
-    added = sum(
-        f.effect.added_mass(f.values) for f in axis.effects if f.effect.added_mass is not None
-    )
     return AxisTables(
-        axis.mass * (1.0 + added), positions, along, speeds, forwards, backwards,
+        axis.weighed.mass, positions, along, speeds, forwards, backwards,
         tuple(_of_one_period(steady, f) for f in repeated),
     )  # fmt: skip
 
