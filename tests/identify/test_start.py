@@ -66,17 +66,6 @@ def test_matrices_are_not_shared_out_unless_the_user_says_so(tmp_path: Path) -> 
     assert chosen["threads"]["OMP_NUM_THREADS"] == "3"
 
 
-def test_the_package_gives_its_calls_by_name() -> None:
-    import identify
-    from identify import workflow
-
-    for name in identify.__all__:
-        found = getattr(identify, name)
-        assert getattr(found, "__wrapped__", found) is getattr(workflow, name)
-    with pytest.raises(AttributeError, match="no attribute 'guess'"):
-        _ = identify.guess
-
-
 def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
     """SciPy's larger parts take a second to load, the smaller ones half of one, as a fit runs.
 
@@ -96,19 +85,24 @@ def blas_threads() -> set[int]:
     return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
 
 
-def test_a_call_from_python_has_one_thread_for_matrices_and_leaves_them(monkeypatch) -> None:
+@pytest.fixture
+def unsaid(monkeypatch) -> pytest.MonkeyPatch:
+    """An environment that does not say how many threads."""
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
+    return monkeypatch
+
+
+def test_a_call_from_python_has_one_thread_for_matrices_and_leaves_them(unsaid) -> None:
     with threadpool_limits(2, user_api="blas"):
         assert one_for_matrices(blas_threads)() == {1}
         assert blas_threads() == {2}
-        monkeypatch.setenv(VARIABLES[0], "2")
+        unsaid.setenv(VARIABLES[0], "2")
         assert one_for_matrices(blas_threads)() == {2}
 
 
-def test_calls_that_overlap_have_one_thread_for_matrices_and_leave_them(monkeypatch) -> None:
-    for name in VARIABLES:
-        monkeypatch.delenv(name, raising=False)
+@pytest.mark.usefixtures("unsaid")
+def test_calls_that_overlap_have_one_thread_for_matrices_and_leave_them() -> None:
     begun, joined, over = Event(), Event(), Event()
 
     @one_for_matrices

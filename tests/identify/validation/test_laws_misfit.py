@@ -104,14 +104,12 @@ def test_a_direction_has_two_bins():
     found = misfit_map("direction", r, v, 0.1)
     np.testing.assert_allclose(found.mean, [2.0, 5.0])
     np.testing.assert_allclose(found.visited, [2.0 / 6.0, 4.0 / 6.0])
-    words = [region_in_words(r) for r in worst_regions([found], MANY)]
-    assert words[0].startswith("moving forwards: 5.34 N RMS, 53.4 times the noise floor, 92 %")
-    turned = misfit_map("direction", r[::-1] * [9, 9, 1, 1, 1, 1], -v[::-1], 0.1)
-    behind = worst_regions([turned], MANY)
-    assert region_in_words(behind[0]).startswith("moving")
     turned = misfit_map("direction", np.array([9.0, 8.0, 1, 1, 1, 1]), v, 0.1)
-    swapped = worst_regions([turned], MANY)
-    assert region_in_words(swapped[0]).startswith("moving backwards")
+    for one, said in (
+        (found, "moving forwards: 5.34 N RMS, 53.4 times the noise floor, 92 %"),
+        (turned, "moving backwards"),
+    ):
+        assert region_in_words(worst_regions([one], MANY)[0]).startswith(said)
 
 
 def test_an_error_planted_in_a_bin_is_the_worst_region():
