@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from identify import workflow
-from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
-from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
 from identify.output.numbers import quantity
 from identify.output.report import Source, write_report
@@ -71,24 +71,25 @@ def demo(
     rng = np.random.default_rng(seed)
     machine, hidden = hidden_machine(model, catalogue, rng)
     say("1. a machine with an effect that the model lacks runs four experiments, logged as MCAP")
-    logs = {
-        f"machine_{i}.mcap": _record(
-            machine, experiment, folder / f"machine_{i}.mcap", seed + 1000 * i, progress
-        )
-        for i, experiment in enumerate((*TRAINING, SELECTION, TEST), start=1)
-    }
+    logs: dict[str, Log] = {}
+    for i, experiment in enumerate((*TRAINING, SELECTION, TEST), start=1):
+        path = folder / f"machine_{i}.mcap"
+        logs[path.name] = simulate(
+            machine, experiment, seed=seed + 1000 * i, duration=DURATION,
+            progress=partial(progress, f"simulating {path.name}"),
+        )  # fmt: skip
+        write_log(logs[path.name], path)
     test, held = dict([logs.popitem()]), dict([logs.popitem()])
-    known = ", ".join(model.axes[_first(model)].names)
+    known = ", ".join(next(iter(model.axes.values())).names)
     say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, test, catalogue=catalogue, progress=progress)
-    addition, worth = None, None
-    final = diagnosis.model
+    addition, worth, final = None, None, diagnosis.model
     if diagnosis.effect is not None:
-        say(f"3. the diagnosis names {diagnosis.effect.name} on {diagnosis.leading.dataset.axis}")
+        axis = diagnosis.leading.dataset.axis
+        say(f"3. the diagnosis names {diagnosis.effect.name} on {axis}")
         addition = workflow.add_named(diagnosis) or workflow.add(
-            diagnosis.effect, diagnosis.model, logs, held, test,
-            axis=diagnosis.leading.dataset.axis, progress=progress,
-        )  # fmt: skip
+            diagnosis.effect, diagnosis.model, logs, held, test, axis=axis, progress=progress
+        )
         final = addition.model
         say(_fallen(addition))
         worth = workflow.feedforward(
@@ -107,17 +108,6 @@ def demo(
         source=Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
     )
     return Demo(hidden, diagnosis, addition, worth, report)
-
-
-def _record(
-    machine: MachineModel, experiment: str, path: Path, seed: int, progress: Progress
-) -> Log:
-    log = simulate(
-        machine, experiment, seed=seed, duration=DURATION,
-        progress=lambda done, total: progress(f"simulating {path.name}", done, total),
-    )  # fmt: skip
-    write_log(log, path)
-    return log
 
 
 def _fallen(addition: Addition) -> str:
@@ -156,35 +146,22 @@ def hidden_machine(
         machine, "tracking", seed=int(rng.integers(1 << 30)), duration=DURATION,
         simulator=ReducedSimulator,
     )  # fmt: skip
-    name = _first(machine)
+    name, axis = next(iter(machine.axes.items()))
     dataset = datasets(machine, {"log": log}, {})[name]
-    base = fit_axis(machine.axes[name], dataset.fit)
-    absent = [e for e in catalogue.values() if _can_hide(e, machine)]
+    base = fit_axis(axis, dataset.fit)
+    absent = [
+        effect for effect in catalogue.values()
+        if effect.name not in axis.names and machine.can_use(effect) and _can_hide(effect)
+    ]  # fmt: skip
     for index in rng.permutation(len(absent)):
-        hidden = draw_effect(
-            absent[index], machine.axes[name], dataset.fit, dataset.excitation, FORCE, rng
-        )
-        if shows(hidden, base, dataset):
-            return machine.with_axis(name, machine.axes[name].with_effect(hidden)), hidden
+        hidden = draw_effect(absent[index], axis, dataset.fit, dataset.excitation, FORCE, rng)
+        if hidden_part(hidden, base, dataset) < 1.0 - VISIBLE:
+            return machine.with_axis(name, axis.with_effect(hidden)), hidden
     raise InputError(
         "no effect of the catalogue can be seen in the motion of this machine; try another seed"
     )
 
 
-def _first(model: MachineModel) -> str:
-    """The axis that gets the hidden effect."""
-    return next(iter(model.axes))
-
-
-def _can_hide(effect: Effect, machine: MachineModel) -> bool:
-    return (
-        effect.name not in machine.axes[_first(machine)].names
-        and machine.can_use(effect)
-        and effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
-        and not effect.is_nonparametric
-    )  # fmt: skip
-
-
-def shows(hidden: Fitted, base: Fit, dataset: Dataset) -> bool:
-    """Whether the parameters of the base cannot absorb the hidden effect's force."""
-    return hidden_part(hidden, base, dataset) < 1.0 - VISIBLE
+def _can_hide(effect: Effect) -> bool:
+    kinds = (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
+    return effect.kind in kinds and not effect.is_nonparametric

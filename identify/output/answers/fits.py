@@ -66,8 +66,8 @@ class FitEntry(Entry):
     noise_floor: Number = read("floor")
     holdout_force_error: Number
     test_force_error: Number
-    unit: str
-    left_out: list[str]
+    unit: str = read("axis.units.force")
+    left_out: list[str] = read("still")
     """Logs in which the axis stands still."""
     force_noise: Number
     """Force that no sensor makes and nothing measured foretells, RMS."""
@@ -100,8 +100,6 @@ def _(result: FitResult, **more: Any) -> FitAnswer:
             converged=fit.ended.name != "NOT_CONVERGED",
             holdout_force_error=result.holdout_error[axis],
             test_force_error=result.test_error[axis],
-            unit=fit.axis.units.force,
-            left_out=result.left_out[axis],
             beginnings_left_out=result.datasets[axis].begun,
             parameters=estimate_entries(result.estimates[axis]),
             refit=result.refits[axis],
@@ -154,7 +152,7 @@ class SimulationFitEntry(Entry):
     position_error_of_force_fit: Number = read("error_begun")
     holdout_position_error: Number
     holdout_position_error_of_force_fit: Number
-    unit: str
+    unit: str = read("axis.units.position")
     errors_of_starts: list[Number] = read("starts")
     parameters: dict[str, SimulatedValueEntry]
     beginnings: dict[str, BeginningEntry]
@@ -189,7 +187,6 @@ def _motion_fit(fit: MotionFit, held: tuple[float, float] | None) -> SimulationF
         converged=fit.outcome.name != "NOT_CONVERGED",
         holdout_position_error=after,
         holdout_position_error_of_force_fit=before,
-        unit=units.position,
         parameters={
             c.label: {"value": now, "force_fit": begun, "unit": units(c.parameter.unit)}
             for c, now, begun in values

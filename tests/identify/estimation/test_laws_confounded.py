@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-import built_results as made
 import numpy as np
 import pytest
 from built_fits import (
@@ -18,7 +17,6 @@ from built_fits import (
     known_floor,
 )
 
-from identify import demo
 from identify.estimation import confounded as given
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished
@@ -205,25 +203,3 @@ def test_the_picture_of_an_effect_is_over_time_position_and_speed(monkeypatch, t
         np.testing.assert_allclose(y, force)
     assert figure.axes[0].get_ylabel() == "Added force (N)"
     assert "<svg" in (tmp_path / "f.svg").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(("part", "seen"), [(0.49, True), (0.51, False)])
-def test_a_hidden_effect_shows_where_half_of_it_cannot_be_absorbed(monkeypatch, part, seen):
-    monkeypatch.setattr(demo, "hidden_part", lambda hidden, base, dataset: part)
-    assert demo.shows(None, None, None) is seen
-
-
-def test_what_is_hidden_in_a_demonstration_is_physics_that_is_absent():
-    machine = MachineModel("m", {"x": axis_of(fitted("wear"))})
-    hidden = {n for n, e in CATALOGUE.items() if demo._can_hide(e, machine)}
-    assert hidden == {
-        n
-        for n, e in CATALOGUE.items()
-        if e.kind.name in ("FORCE", "MODIFIER", "ACTUATION")
-        and n not in ("wear", "empirical_map", "learned_residual", "free_curve")
-    }
-
-
-def test_the_fall_of_the_error_is_told_in_its_order():
-    found = demo._fallen(replace(made.addition(), step=made.STEPS[1]))
-    assert "from 5030.00 mN to 2830.00 mN, 2 times; the noise floor is 1030.00 mN" in found
