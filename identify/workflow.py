@@ -31,13 +31,14 @@ from identify.output.text import diagnose_text as diagnose_text  # with it resul
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
 from identify.results.results import (
+    AxisSummary,
     Comparison,
     Diagnosis,
     Feedforward,
     FitResult,
     SimulationFit,
+    summary_of,
 )
-from identify.results.told import Told, told_of
 from identify.selection.curves import having_shape
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
@@ -214,16 +215,16 @@ def diagnose(
         for axis, fitted in result.fits.items()
     }
     progress("intervals and the next experiment", 0, 1)
-    told = {axis: told_of(d) for axis, d in axes.items()}
-    model = _begun(result.model, axes, told)
+    summaries = {axis: summary_of(d) for axis, d in axes.items()}
+    model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = {axis: d.dataset for axis, d in axes.items()}
     return Diagnosis(
         model=model,
         axes=axes,
-        comparison=_compared(model, prepared, {a: t.floor for a, t in told.items()}, progress),
-        told=told,
+        comparison=_compared(model, prepared, {a: t.floor for a, t in summaries.items()}, progress),
+        summaries=summaries,
         next_experiments=plans,
         refits={axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()},
         not_tried=tuple(name for name in catalogue if name not in known),
@@ -233,12 +234,12 @@ def diagnose(
 
 
 def _begun(
-    model: MachineModel, axes: Mapping[str, AxisDiagnosis], told: Mapping[str, Told]
+    model: MachineModel, axes: Mapping[str, AxisDiagnosis], summaries: Mapping[str, AxisSummary]
 ) -> MachineModel:
     """The fitted model that the answers start from: a diagnosis may find another channel delay."""
     for axis, found in axes.items():
         model = model.with_axis(axis, found.base.axis)
-        model = model.with_intervals(axis, intervals_to_keep(found.base, told[axis].before))
+        model = model.with_intervals(axis, intervals_to_keep(found.base, summaries[axis].before))
     return model
 
 

@@ -20,8 +20,7 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.results.addition import Addition
-from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
-from identify.results.told import Told
+from identify.results.results import AxisSummary, Comparison, Diagnosis, FitResult, SimulationFit
 from identify.selection.acceptance import Score, Taken
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding
@@ -119,12 +118,13 @@ def diagnosis_of(
     return found
 
 
-def told_of(found: AxisDiagnosis) -> Told:
-    """What is told of a built diagnosis."""
+def summary_of(found: AxisDiagnosis) -> AxisSummary:
+    """The summary of a built diagnosis."""
     before = estimates(0.5)[::2]
     after = before if found.final is found.base else estimates(0.0)
     floors = {Role.TRAINING: 2.03, Role.SELECTION: 2.17} if found.dataset.holdout else {}
-    return Told(before, after, (), found.tested, found.chosen, {Role.TRAINING: 2.03, **floors}, 1.0)
+    floors = {Role.TRAINING: 2.03, **floors}
+    return AxisSummary(before, after, (), found.tested, found.chosen, floors, 1.0)
 
 
 STRUCTURE = Dependence(
@@ -203,10 +203,10 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
         ranking=(replace(WEAK, axis="y"),),
     )  # fmt: skip
     axes = {"y": y, "x": x or diagnosis_of()}
-    told = {axis: told_of(d) for axis, d in axes.items()}
-    told["y"] = replace(told["y"], floors={Role.TRAINING: 0.97, Role.SELECTION: 0.99})
+    summaries = {axis: summary_of(d) for axis, d in axes.items()}
+    summaries["y"] = replace(summaries["y"], floors={Role.TRAINING: 0.97, Role.SELECTION: 0.99})
     return Diagnosis(
-        MODEL, axes, compared(), told,
+        MODEL, axes, compared(), summaries,
         {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
         left_over={"x": LEFT_OVER} if x and x.unexplained else {},
     )  # fmt: skip

@@ -13,8 +13,7 @@ from identify.output.report.answer import cards
 from identify.output.report.page import Answer
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
-from identify.results.results import Diagnosis
-from identify.results.told import told_of
+from identify.results.results import Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
@@ -48,7 +47,7 @@ class Case:
 
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""
-        told = {"x": told_of(x)}
+        told = {"x": summary_of(x)}
         return Diagnosis(self.diagnosis.model, {"x": x}, self.diagnosis.comparison, told)
 
     @property

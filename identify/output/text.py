@@ -44,13 +44,13 @@ from identify.output.words.residual import correlation_in_words, loop_in_words, 
 from identify.results import figure_of, html_of, text_of
 from identify.results.addition import Addition
 from identify.results.results import (
+    AxisSummary,
     Comparison,
     Diagnosis,
     Feedforward,
     FitResult,
     SimulationFit,
 )
-from identify.results.told import Told
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
@@ -171,7 +171,7 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
         named = f" Missing: {named_in_words(d)}." if d.named else ""
         lines += [
             f"axis {axis}: {said.verdict}{named}",
-            f"  {words('force error')} {_errors(d, result.told[axis])}",
+            f"  {words('force error')} {_errors(d, result.summaries[axis])}",
         ]
         if d.tested.on is not Role.TRAINING:
             lines.append(f"  {named_errors_in_words(d)}")
@@ -188,9 +188,9 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     return "\n".join(lines)
 
 
-def _errors(found: AxisDiagnosis, told: Told) -> str:
+def _errors(found: AxisDiagnosis, summary: AxisSummary) -> str:
     """Errors on the training logs without and with what was found, and the noise floor."""
-    unit, floor = found.base.axis.units.force, told.floor
+    unit, floor = found.base.axis.units.force, summary.floor
     base, final = found.base.error, found.final.error
     if found.final is found.base:
         return f"on the training logs {quantity(base, unit)}, {over_floor(base, floor, unit)}"

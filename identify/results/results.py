@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from identify.dataset.dataset import Dataset
-from identify.estimation.confounded import Refit
-from identify.estimation.fit import Fit
-from identify.estimation.intervals import Estimate
+from identify.dataset.dataset import Dataset, Role
+from identify.dataset.floor import NoiseFloor
+from identify.dataset.noise_floor import floor_of
+from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
+from identify.estimation.fit import Errors, Fit, error_in
+from identify.estimation.intervals import Estimate, estimates
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.results import Pictured, Printed
-from identify.results.told import Told
+from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import Region
@@ -112,11 +114,58 @@ class Feedforward(Printed):
         return {name: followed(self.model.axes[name]).lost for name in self.axes}
 
 
+@dataclass(frozen=True)
+class AxisSummary:
+    """The final model of an axis, and how it differs from the one that was fitted before.
+
+    before, after: estimates without and with what was found. moved: parameters that what was found
+    changed. tested, chosen: errors without and with it on the test logs and on those that chose.
+    floors: noise floor of the final model on the logs of each role, N RMS, the only one that is
+    told: never more than what the model leaves there, as noise is part of that. selection_ratio:
+    error of the model without what was found on the selection logs over their noise floor; None
+    where there are none. noise: the floor on the training logs with its parts.
+    """
+
+    before: tuple[Estimate, ...]
+    after: tuple[Estimate, ...]
+    moved: tuple[MovedParameter, ...]
+    tested: Errors
+    chosen: Errors
+    floors: Mapping[Role, float]
+    selection_ratio: float | None = None
+    noise: NoiseFloor | None = None
+
+    @property
+    def floor(self) -> float:
+        """Noise floor on the training logs, N RMS."""
+        return self.floors[Role.TRAINING]
+
+
+def summary_of(found: AxisDiagnosis) -> AxisSummary:
+    """The summary of a diagnosis."""
+    base, final, dataset = found.base, found.final, found.dataset
+    floors = {Role.TRAINING: final.floor}
+    for role in (Role.SELECTION, Role.TEST):
+        if logs := dataset.having(role):
+            floors[role] = min(floor_of(final.axis, logs), error_in(role, final, dataset))
+    judged, before = Judged(base, dataset), estimates(base)
+    return AxisSummary(
+        before=before,
+        after=before if final is base else estimates(final),
+        moved=() if final is base else moved_parameters(base, final),
+        tested=found.tested,
+        chosen=found.chosen,
+        floors=floors,
+        selection_ratio=judged.other_error / judged.other_floor if dataset.holdout else None,
+        noise=final.noise,
+    )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Pictured):
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
-    model: with the values of the fit before anything was found. told: what is told of each axis.
+    model: with the values of the fit before anything was found. summaries: of each axis.
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
     refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
@@ -127,7 +176,7 @@ class Diagnosis(Pictured):
     model: MachineModel
     axes: Mapping[str, AxisDiagnosis]
     comparison: Comparison
-    told: Mapping[str, Told]
+    summaries: Mapping[str, AxisSummary]
     next_experiments: Mapping[str, Plan] = field(default_factory=dict)
     refits: Mapping[str, Refit] = field(default_factory=dict)
     not_tried: tuple[str, ...] = ()

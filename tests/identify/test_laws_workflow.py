@@ -59,7 +59,7 @@ def case() -> Case:
 
 
 def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_final_model(case):
-    x, told, compared = case.x, case.diagnosis.told["x"], case.diagnosis.comparison.axes["x"]
+    x, told, compared = case.x, case.diagnosis.summaries["x"], case.diagnosis.comparison.axes["x"]
     assert compared.logs is x.dataset.fit
     assert compared.total_error == pytest.approx(x.base.error)
     assert compared.floor == told.floor

@@ -372,11 +372,11 @@ def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
 
 
 def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
-    d, told, said = result.axes[axis], result.told[axis], said_of(result, axis)
+    d, summary, said = result.axes[axis], result.summaries[axis], said_of(result, axis)
     planned = result.next_experiments.get(axis)
     return DiagnosisEntry.of(
         d,
-        told,
+        summary,
         axis=axis,
         verdict=d.verdict.name.lower(),
         explanation=said.verdict,
@@ -386,7 +386,7 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
         ranking=[CandidateEntry.of(c, **_candidate(c, d)) for c in d.ranking],
         steps=[_step(d, i) for i in range(len(d.steps))],
         unit=d.base.axis.units.force,
-        parameters=estimate_entries(told.after),
+        parameters=estimate_entries(summary.after),
         refit=result.refits.get(axis),
         not_tried=result.not_tried,
         notes=said.notes,

@@ -11,8 +11,7 @@ from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
 from identify.results.addition import Addition
-from identify.results.results import Diagnosis
-from identify.results.told import Told
+from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.model.machine import HistoryStep
@@ -21,14 +20,14 @@ from twin.model.machine import HistoryStep
 def cards(view: AxisView) -> list[Block]:
     """The card of an axis; before it, where nothing was diagnosed, one for its latest addition."""
     diagnosis = view.subject.diagnosis
-    if diagnosis and view.found and view.told and view.said:
-        return [_diagnosed(view, diagnosis, view.found, view.told, view.said)]
+    if diagnosis and view.found and view.summary and view.said:
+        return [_diagnosed(view, diagnosis, view.found, view.summary, view.said)]
     added = [a for a in view.subject.additions if a.step.axis == view.name]
     return [*(_added(a) for a in added[-1:]), _compared(view)]
 
 
 def _diagnosed(
-    view: AxisView, diagnosis: Diagnosis, found: AxisDiagnosis, told: Told, said: Said
+    view: AxisView, diagnosis: Diagnosis, found: AxisDiagnosis, summary: AxisSummary, said: Said
 ) -> Answer:
     quiet = found.verdict is Verdict.NOTHING_MISSING
     plan, refit = diagnosis.next_experiments.get(view.name), diagnosis.refits.get(view.name)
@@ -42,23 +41,23 @@ def _diagnosed(
     return Answer(
         headline=f"Axis {view.name}: {said.headline}",
         sentence=" ".join((said.verdict, *said.left)),
-        tiles=_tiles(view, found, told),
+        tiles=_tiles(view, found, summary),
         remarks=[capitalised(text) for text in remarks if text],
         tone=Tone.PLAIN if quiet else Tone.STRONG,
         commands=[view.subject.command(text) for text in said.commands],
     )
 
 
-def _tiles(view: AxisView, found: AxisDiagnosis, told: Told) -> list[Tile]:
+def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[Tile]:
     """The errors without and with what was found, on the logs of each role."""
-    base, final, floor, unit = found.base, found.final, told.floor, view.units.force
+    base, final, floor, unit = found.base, found.final, summary.floor, view.units.force
     errors = {f"{Role.TRAINING.value} logs": (base.error, final.error)}
     if found.dataset.holdout:
-        errors["selection logs"] = (told.chosen.before, told.chosen.after)
+        errors["selection logs"] = (summary.chosen.before, summary.chosen.after)
     elif found.best is not None and len(found.named) == 1:
         errors[tested_on(found).split()[0]] = (found.best.gain.before, found.best.gain.after)
-    if told.tested.on is Role.TEST:
-        errors["test logs"] = (told.tested.before, told.tested.after)
+    if summary.tested.on is Role.TEST:
+        errors["test logs"] = (summary.tested.before, summary.tested.after)
     remark = f"with {view.label}, RMS" if view.label else "RMS"
     tiles = [
         Tile(view.words(f"Force error, {on}"), _fall(*pair, unit), remark)

@@ -42,7 +42,7 @@ from identify.output.words.fit import (
     nonparametric_in_words,
 )
 from identify.results.addition import Addition
-from identify.results.told import Told
+from identify.results.results import AxisSummary
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import nonparametric_labels
@@ -282,8 +282,8 @@ def _law(effect: Effect, model: AxisModel, axis: str) -> list[Block]:
 
 def parameters(view: AxisView) -> list[Block]:
     """A table: with intervals where the model was fitted here."""
-    if view.found and view.told:
-        return [_fitted(view.found, view.told, view.label)]
+    if view.found and view.summary:
+        return [_fitted(view.found, view.summary, view.label)]
     return [given_table(view.model)]
 
 
@@ -317,12 +317,12 @@ def fit_table(axis: AxisModel, known: Sequence[Estimate]) -> Table:
     return Table(columns, rows)
 
 
-def _fitted(found: AxisDiagnosis, told: Told, label: str) -> Table:
+def _fitted(found: AxisDiagnosis, summary: AxisSummary, label: str) -> Table:
     """Values of the fitted model, beside those of the model with what was found."""
-    sides = {f"Without {label}": told.before, f"With {label}": told.after}
+    sides = {f"Without {label}": summary.before, f"With {label}": summary.after}
     if not label:
-        sides = {"Value": told.before}
-    labels = list(dict.fromkeys(e.label for e in (*told.after, *told.before)))
+        sides = {"Value": summary.before}
+    labels = list(dict.fromkeys(e.label for e in (*summary.after, *summary.before)))
     meanings = _meanings(found.final.axis)
     columns, remarks, cells = [Column("Parameter")], [], {name: [name] for name in labels}
     for heading, known in sides.items():
@@ -330,7 +330,7 @@ def _fitted(found: AxisDiagnosis, told: Told, label: str) -> Table:
         # Where all values have the same reason, it is in the caption instead of a column.
         if common := common_reason(known):
             if isinstance(common, ModelWrong):  # over the one noise floor of this page
-                common = replace(common, floor=told.floor)
+                common = replace(common, floor=summary.floor)
             remarks.append(f"{heading}: {no_interval_in_words(common)}.")
         else:
             columns.append(Column("90 % interval"))

@@ -11,9 +11,8 @@ from identify.estimation.fit import Fit
 from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
-from identify.results.results import Comparison, Diagnosis
+from identify.results.results import AxisSummary, Comparison, Diagnosis
 from identify.results.signals import Signals, signals_of
-from identify.results.told import Told
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
@@ -102,9 +101,9 @@ class AxisView:
         return self.subject.diagnosis.axes.get(self.name) if self.subject.diagnosis else None
 
     @property
-    def told(self) -> Told | None:
+    def summary(self) -> AxisSummary | None:
         """What is told of its final model, where it was diagnosed."""
-        return self.subject.diagnosis.told.get(self.name) if self.subject.diagnosis else None
+        return self.subject.diagnosis.summaries.get(self.name) if self.subject.diagnosis else None
 
     @cached_property
     def said(self) -> Said | None:
@@ -128,7 +127,7 @@ class AxisView:
     @property
     def floors(self) -> Mapping[Role, float]:
         """The noise floors by role of logs, N RMS."""
-        return self.told.floors if self.told else {Role.TRAINING: self.axis.floor}
+        return self.summary.floors if self.summary else {Role.TRAINING: self.axis.floor}
 
     @cached_property
     def signals(self) -> Signals:

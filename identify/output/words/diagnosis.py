@@ -23,8 +23,7 @@ from identify.output.words.fit import (
     refit_in_words,
 )
 from identify.output.words.residual import dependence_in_words, repeat_in_words, worst_in_words
-from identify.results.results import Diagnosis
-from identify.results.told import Told
+from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Freed
@@ -60,7 +59,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     """The sentences about one axis of a diagnosis."""
     found, region = result.axes[axis], result.left_over.get(axis)
     words = found.base.axis.units.words
-    left = left_in_words(found, result.told[axis].floor)
+    left = left_in_words(found, result.summaries[axis].floor)
     if found.unexplained:
         left.append(dependence_in_words(found.unexplained))
         left += [words(worst_in_words(region))] if region else []
@@ -246,17 +245,17 @@ NO_SELECTION_LOG = (
 
 def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
     """Channel delays, fits that did not converge, changed parameters, weak proof of one axis."""
-    found, told = result.axes[axis], result.told[axis]
+    found, summary = result.axes[axis], result.summaries[axis]
     refit, units = result.refits.get(axis), found.base.axis.units
     quiet = found.verdict is Verdict.NOTHING_MISSING
     every = [
         refit and refit_in_words(refit),
         *prepared_in_words(found.dataset),
-        *_about_the_fits(found, told),
+        *_about_the_fits(found, summary),
         found.repeat and repeat_in_words(found.repeat),
         None if found.dataset.holdout else NO_SELECTION_LOG,
-        told.noise and aliasing_in_words(told.noise, units),
-        _beyond_in_words(told, units.words("force error")) if quiet else None,
+        summary.noise and aliasing_in_words(summary.noise, units),
+        _beyond_in_words(summary, units.words("force error")) if quiet else None,
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]
     if axis in result.not_planned:
@@ -270,7 +269,7 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
     return tuple(note for note in every if note)
 
 
-def _about_the_fits(found: AxisDiagnosis, told: Told) -> list[str]:
+def _about_the_fits(found: AxisDiagnosis, summary: AxisSummary) -> list[str]:
     """That a fit did not converge, and which parameters what was found has moved."""
     words, converged, said = found.base.axis.units.words, Outcome.CONVERGED, []
     if found.base.ended is not converged:
@@ -280,14 +279,15 @@ def _about_the_fits(found: AxisDiagnosis, told: Told) -> list[str]:
     with_it = f"with {listed([f.effect for f in found.findings])}"
     if found.final.ended is not converged:
         said.append(f"{with_it}: {words(OUTCOMES[found.final.ended])}")
-    return said + [f"{with_it}, {words(moved_in_words(m))}" for m in told.moved]
+    return said + [f"{with_it}, {words(moved_in_words(m))}" for m in summary.moved]
 
 
-def _beyond_in_words(told: Told, error: str) -> str | None:
+def _beyond_in_words(summary: AxisSummary, error: str) -> str | None:
     """That the selection logs show what the training logs do not; None where they do not."""
-    if told.selection_ratio is None or told.selection_ratio < RULE.at_floor:
+    if summary.selection_ratio is None or summary.selection_ratio < RULE.at_floor:
         return None
     return (
         f"this holds for the training logs alone: on the selection logs the {error} is "
-        f"{told.selection_ratio:.1f} times its noise floor. Give such a log as a training log too"
+        f"{summary.selection_ratio:.1f} times its noise floor. Give such a log as a training log "
+        "too"
     )

@@ -211,9 +211,9 @@ def test_fitted_values_stand_beside_those_without_the_effect():
 def test_a_model_that_is_wrong_has_no_intervals_and_one_reason():
     found = made.diagnosed()
     wrong = tuple(replace(e, low=None, high=None, reason=refusal(made.BASE) if e.free else None)
-                  for e in found.told["x"].before)  # fmt: skip
-    told = {**found.told, "x": replace(found.told["x"], before=wrong)}
-    shown = page_of(subject_of(replace(found, told=told)))
+                  for e in found.summaries["x"].before)  # fmt: skip
+    summaries = {**found.summaries, "x": replace(found.summaries["x"], before=wrong)}
+    shown = page_of(subject_of(replace(found, summaries=summaries)))
     titles = shown.sections["parameters"][0][0]
     assert titles.count("90 % interval") == 1
     assert (

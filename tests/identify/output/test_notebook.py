@@ -62,7 +62,7 @@ def test_the_residual_is_drawn_over_the_coordinate_of_the_answer_or_any_other(ca
     dots, means, *_ = place.lines
     errors = np.asarray(dots.get_ydata(), dtype=float)
     rms = np.sqrt(np.nanmean(errors**2))  # of all logs, mN
-    assert 1e3 * min(found.told["x"].chosen.before, case.x.base.error) < rms < 80.0
+    assert 1e3 * min(found.summaries["x"].chosen.before, case.x.base.error) < rms < 80.0
     assert np.nanmax(np.abs(np.asarray(means.get_ydata(), dtype=float))) < np.nanmax(np.abs(errors))
     (alone,) = found.comparison.residual.against("time").axes
     assert len(alone.lines) == 2  # of one model

@@ -75,7 +75,7 @@ def test_page_says_the_verdict(case: Case, page: str) -> None:
     assert verdict_in_words(case.x) in text
     assert "twin add cogging MODEL 'run 1' --holdout 'run 2' -o better.toml" in text
     assert typeset(arrow(case.x.base.error, best.fit.error, "N")) in text
-    final, floor = case.x.final, case.diagnosis.told["x"].floor
+    final, floor = case.x.final, case.diagnosis.summaries["x"].floor
     assert typeset(arrow(case.x.base.error / floor, final.error / floor, "1")) in text
     assert best.effect.equation in text
     assert best.effect.fingerprint in text
@@ -145,7 +145,8 @@ def test_the_page_holds_the_forces_of_the_final_model(case: Case, page: str) -> 
     assert np.nanmax(np.abs(left)) < 1e-3 * np.abs(held["to_explain"]).max()
     assert axis["against"] == "cogging_phase"
     assert [log["title"] for log in axis["logs"]] == ["run 1 (training)", "run 2 (selection)"]
-    assert axis["floor"] == pytest.approx(case.diagnosis.told["x"].floor / size(axis, "before"))
+    floor = case.diagnosis.summaries["x"].floor
+    assert axis["floor"] == pytest.approx(floor / size(axis, "before"))
 
 
 def test_a_comparison_alone_has_one_residual(case: Case, tmp_path: Path) -> None:
@@ -184,7 +185,7 @@ def test_of_many_samples_no_extreme_is_lost() -> None:
 
 def test_the_floor_of_a_role_is_one_number_on_the_page(case: Case, page: str) -> None:
     text = Outline(page).text
-    told = case.diagnosis.told["x"]
+    told = case.diagnosis.summaries["x"]
     floors = {typeset(quantity(f, "N")) for f in told.floors.values()}
     floors |= {f"{1e3 * f:.3g}" for f in told.floors.values()}
     said = re.findall(r"(?:noise floor|floor)(?: of the force:)? ([\d.]+ m?N)", text)

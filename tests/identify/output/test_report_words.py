@@ -17,8 +17,7 @@ from identify.output.report.effects import equations
 from identify.output.report.page import Heading
 from identify.output.report.subject import Subject
 from identify.output.words.diagnosis import verdict_in_words
-from identify.results.results import Diagnosis
-from identify.results.told import told_of
+from identify.results.results import Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 
@@ -88,7 +87,7 @@ def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
         axes={"a": replace(compared.axes["x"], axis="a"), "x": compared.axes["x"]},
     )
     axes = {"a": case.quiet, "x": case.x}
-    told = {axis: told_of(d) for axis, d in axes.items()}
+    told = {axis: summary_of(d) for axis, d in axes.items()}
     diagnosis = Diagnosis(both.model, axes, both, told)
     cards = answers(Subject("Report", diagnosis, both, (), ()))
     assert [card.headline[:7] for card in cards] == ["Axis x:", "Axis a:"]

@@ -97,9 +97,9 @@ def moved():
     """Parameters that moved with what was found; no experiment, and effects that were not tried."""
     result = of(made.diagnosis_of())
     away = (made.MOVED, replace(made.MOVED, label="b", collapsed=True))
-    told = {**result.told, "x": replace(result.told["x"], moved=away)}
+    summaries = {**result.summaries, "x": replace(result.summaries["x"], moved=away)}
     tried = {"not_tried": ("axis_coupling",), "not_planned": {"x": "no travel"}}
-    return replace(result, told=told, **tried)
+    return replace(result, summaries=summaries, **tried)
 
 
 def shaped(kind: FindingKind, **more: object):
@@ -111,9 +111,9 @@ def shaped(kind: FindingKind, **more: object):
 def beyond():
     """Nothing missing of the training logs, while the selection logs show something."""
     result = made.diagnosed()
-    told = {"y": replace(result.told["y"], selection_ratio=3.0)}
+    summaries = {"y": replace(result.summaries["y"], selection_ratio=3.0)}
     quiet = {"axes": {"y": result.axes["y"]}, "refits": {"y": Refit(1.0, 1.0, ())}}
-    return replace(result, told=told, **quiet)
+    return replace(result, summaries=summaries, **quiet)
 
 
 # --- all of them -----------------------------------------------------------------------------
