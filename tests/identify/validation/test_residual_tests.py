@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 from identify.dataset.recorded_motion import motion_of
 from identify.estimation.force_balance import residual
-from identify.output.words.residual import loop_in_words
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
 from identify.workflow import fit
 from twin.effects import load_catalogue
@@ -146,4 +145,3 @@ def test_a_loop_is_closed_where_the_position_follows_its_setpoint():
     assert loop_of([log()]) is Loop.UNKNOWN
     assert loop_of([log(a), log()]) is Loop.UNKNOWN
     assert loop_of([log(0.0 * a), log(a)]) is Loop.CLOSED
-    assert all("coloured" in loop_in_words(loop) for loop in Loop)
