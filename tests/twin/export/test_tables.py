@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from itertools import combinations
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -145,3 +146,18 @@ def test_a_rotary_axis_has_its_own_units() -> None:
     assert "torque over 20 N m/A" in text
     highest = tables(axis, (-0.1, 0.1), 0.2).speeds[-1]
     assert f"].in            {round(1e3 * np.degrees(highest))}" in text
+
+
+def test_ros2_control_has_the_limits_and_a_straight_friction() -> None:
+    made = find_exporter("ros2_control").export(slide(*PLAIN, *UNEVEN), {})
+    root = ElementTree.fromstring(str(made.files["slide_joints.urdf"]))
+    (joint,) = root.findall("joint")
+    assert joint.attrib == {"name": "x", "type": "prismatic"}
+    dynamics = {k: float(v) for k, v in joint.find("dynamics").attrib.items()}
+    assert dynamics == pytest.approx({"friction": 0.5, "damping": 2.0}, rel=0.02)
+    assert float(joint.find("limit").attrib["upper"]) == 0.1
+    limits = [line.strip() for line in str(made.files["slide_joint_limits.yaml"]).splitlines()]
+    for line in ("joint_limits:", "x:", "max_position: 0.1", "max_velocity: 0.2", "max_jerk: 50.0",
+                 "has_effort_limits: false"):  # fmt: skip
+        assert line in limits
+    assert {"cogging", "cable_slab", "asymmetric_friction"} <= {r.part for r in made.lost}
