@@ -196,6 +196,9 @@ class Effect:
     """(effects that an axis has, whether it turns) -> whether a diagnosis offers this one there,
     and not the same law by another name; None: always."""
 
+    joint_attributes: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
+    """Values by name -> attributes of a joint of MuJoCo that hold the effect, or come nearest to
+    it: frictionloss, damping, stiffness, springref, armature, in SI units; None: none does."""
     of_joints: bool | None = None
     """Whether a diagnosis offers it on joints of a mechanism alone (True) or on plain axes alone
     (False), as what it is there is known from the bodies; None: on both."""

@@ -5,7 +5,7 @@ Compiled into each law that calls them, so they are plain functions of numbers a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import copysign, cos, exp, expm1, pi, sin, sqrt
 from typing import Any
 
@@ -49,6 +49,11 @@ BRISTLE_DAMPING = Parameter(
     start_rule=lambda e: 0.5 * e.dry_level / e.speed_max,
 )  # fmt: skip
 STRIBECK_CURVE = (COULOMB_LEVEL, STATIC_LEVEL, STRIBECK_VELOCITY)
+
+
+def dry_and_viscous(values: Mapping[str, float]) -> dict[str, float]:
+    """What a joint of MuJoCo holds of a friction: its Coulomb and its viscous part."""
+    return {"frictionloss": values["Fc"], "damping": values["sigma2"]}
 
 
 def stiffness_at_rest(meaning: str, tried: Sequence[float] = (3e-3, 3e-4, 3e-5)) -> Parameter:

@@ -265,7 +265,7 @@ def export(
         list[Path] | None,
         typer.Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
     ] = None,
-    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
+    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder, or the only file.")] = Path(
         "export"
     ),
     effects: Effects = None,
@@ -281,8 +281,11 @@ def export(
     exporter = find_exporter(to)
     recorded = CheckedRecordings(logs or ())
     made = exporter.export(loaded(model, effects)[0], recorded)
-    make_folder(folder)
-    files = [folder / name for name in made.files]
+    if len(made.files) == 1 and folder.suffix == Path(next(iter(made.files))).suffix:
+        files = [folder]
+    else:
+        make_folder(folder)
+        files = [folder / name for name in made.files]
     for file, content in zip(files, made.files.values(), strict=True):
         write_atomically(file, content.encode() if isinstance(content, str) else content)
     answer = ExportAnswer.of(made, format=to, files=files)

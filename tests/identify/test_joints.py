@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from arms import ARM, COULOMB, JOINTS, VISCOUS, arm_log
+from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, friction
 from cli_runs import refusal, twin
 
-from identify.workflow import fit
+from identify.workflow import diagnose, fit
 from twin.logs import write_log
 from twin.model.file import load_model
 
@@ -35,6 +36,47 @@ def test_planted_friction_is_found(folder):
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
         assert found.fits[joint].ratio < 1.5
         assert found.datasets[joint].channel_delay == 0.0
+
+
+def cogging(q, v):
+    """On the shoulder."""
+    return friction(q, v) + [0.0, 0.25 * np.sin(2.0 * np.pi * q[1] / 0.2), 0.0]
+
+
+def counterbalance(q, v):
+    """On the elbow."""
+    return friction(q, v) - [0.0, 0.0, 0.3 * np.sin(q[2] + 0.3)]
+
+
+def coupled(q, v):
+    """The elbow's motor turns with the shoulder as well."""
+    return friction(q, v) - [0.0, 0.0, 0.15 * np.tanh((v[1] + v[2]) / STEEP)]
+
+
+def rotor(model):
+    """Of the elbow."""
+    model.dof_armature[2] = 0.05
+
+
+HIDDEN = {
+    "rotor_inertia": ("elbow", {"change": rotor}),
+    "cogging": ("shoulder", {"forces": cogging}),
+    "gravity": ("elbow", {"forces": counterbalance}),
+    "transmission_coupling": ("elbow", {"forces": coupled}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_a_hidden_effect_is_named_on_its_joint_and_nowhere_else(folder, effect):
+    joint, planted = HIDDEN[effect]
+    logs = {str(k): arm_log(k, **planted) for k in (1, 2, 3)}
+    parts = ({n: logs[n]} for n in "123")
+    found = diagnose(load_model(folder / "arm.toml"), *parts)
+    assert [found.axes[j].named[:1] for j in JOINTS] == [
+        (effect,) if j == joint else () for j in JOINTS
+    ]
+    assert found.axes[joint].tested.after < 0.1 * found.axes[joint].tested.before
 
 
 @pytest.mark.parametrize(

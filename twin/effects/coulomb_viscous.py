@@ -11,7 +11,7 @@ from math import copysign
 
 from twin.curve import FRICTION_CURVES
 from twin.effect import DRY, HOLD, INDEX, OUT, STATIC, VISCOUS, Effect, Kind, V
-from twin.law_parts import COULOMB_LEVEL, STATIC_LEVEL, VISCOUS_PART
+from twin.law_parts import COULOMB_LEVEL, STATIC_LEVEL, VISCOUS_PART, dry_and_viscous
 
 
 def law(p, s, io):
@@ -42,6 +42,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
+    joint_attributes=dry_and_viscous,
     curves=FRICTION_CURVES,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",

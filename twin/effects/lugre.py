@@ -16,6 +16,7 @@ from twin.law_parts import (
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
     VISCOUS_PART,
+    dry_and_viscous,
     stiffness_at_rest,
 )
 
@@ -63,6 +64,7 @@ EFFECT = Effect(
     ),
     states=("z",),
     law=law,
+    joint_attributes=dry_and_viscous,
     curves=STRIBECK_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",

@@ -25,6 +25,7 @@ EFFECT = Effect(
         Parameter("inertia", "kg", 0.0, 0.0, MOST, "gear^2 x inertia of the rotor", strength=True),
     ),
     law=law,
+    joint_attributes=lambda values: {"armature": values["inertia"]},
     added_mass=added_mass,
     of_joints=True,
     fingerprint="residual is proportional to the joint's own acceleration, in every pose",

@@ -15,6 +15,11 @@ def law(p, s, io):
     io[OUT] = -(p[1] + d * (p[2] + d * (p[3] + d * p[4])))
 
 
+def linear_part(values):
+    k = values["k1"]
+    return {"stiffness": k, "springref": values["middle"] - values["offset"] / k} if k > 0 else {}
+
+
 EFFECT = Effect(
     kind=Kind.FORCE,
     summary="conservative force, smooth in position",
@@ -31,6 +36,7 @@ EFFECT = Effect(
         Parameter("k3", "N/m^3", 0.0, -MOST, MOST, "cubic term", strength=True),
     ),
     law=law,
+    joint_attributes=linear_part,
     curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",

@@ -20,6 +20,7 @@ from twin.law_parts import (
     STRIBECK_EXPONENT,
     STRIBECK_VELOCITY,
     VISCOUS_PART,
+    dry_and_viscous,
     stribeck_level,
 )
 
@@ -55,6 +56,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
+    joint_attributes=dry_and_viscous,
     curves=STRIBECK_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",
     excited_by="constant-speed passes in both directions, most of them slow",

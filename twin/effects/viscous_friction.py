@@ -23,6 +23,7 @@ EFFECT = Effect(
     source="White, Fluid Mechanics, section 1.7",
     parameters=(Parameter("c", "N s/m", 0.0, 0.0, MOST, "drag coefficient", strength=True),),
     law=law,
+    joint_attributes=lambda values: {"damping": values["c"]},
     fingerprint="residual is proportional to speed, in both directions alike",
     excited_by="passes at several speeds, up to the highest",
     suits=lambda present, turns: not any(map(has_viscous_part, present)),

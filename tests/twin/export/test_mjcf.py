@@ -1,0 +1,104 @@
+"""The user's own MJCF file, with the friction that was found, moves as the machine did."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from arms import ARM, COULOMB, JOINTS, VISCOUS, arm_of
+from cli_runs import refusal, twin
+from effect_runs import CATALOGUE
+
+from twin.export.formats.mjcf import attributes_of, export
+from twin.model.file import save_model
+from twin.model.machine import AxisModel, Fitted, MachineModel
+
+COMMENTED = ARM.replace(
+    '<joint name="elbow"', "<!-- <joint name='elbow'/> as drawn -->\n          <joint name='elbow'"
+).replace('name="base" axis', 'name="base" damping="7"\n   frictionloss="2" armature="0.5" axis')
+
+
+def fitted(effect: str, **values: float) -> Fitted:
+    return Fitted.at_start(CATALOGUE[effect], values)
+
+
+def model(text: str = COMMENTED, **more: Fitted) -> MachineModel:
+    """The arm with its planted friction, and more on some joints."""
+    axes = {}
+    for joint, dry, wet in zip(JOINTS, COULOMB, VISCOUS, strict=True):
+        friction = fitted("coulomb_viscous", Fc=dry, Fs=dry, sigma2=wet)
+        own = (friction, more[joint]) if joint in more else (friction,)
+        axes[joint] = AxisModel(1.0, effects=own, mass_fixed=True, rotary=True, joint=joint)
+    return MachineModel("arm", axes, 1000.0, text, "arm.xml")
+
+
+def pushed(text: str, friction: bool) -> np.ndarray:
+    """Where the arm is after 0.4 s under torques; friction: that of ``arms`` applied by hand."""
+    made = mujoco.MjModel.from_xml_string(text)
+    made.opt.timestep, made.opt.integrator = 1e-4, mujoco.mjtIntegrator.mjINT_EULER
+    data = mujoco.MjData(made)
+    for k in range(4000):
+        data.qfrc_applied[:] = np.array([3.0, 8.0, 2.0]) * np.sin(5.0 * k * 1e-4)
+        if friction:
+            slow = COULOMB * np.tanh(data.qvel / 2e-3) + VISCOUS * data.qvel
+            data.qfrc_applied[:] -= slow
+        mujoco.mj_step(made, data)
+    return data.qpos.copy()
+
+
+def test_it_moves_as_the_machine_in_bare_mujoco():
+    made = export(model(), {}).files["arm.xml"]
+    assert isinstance(made, str)
+    np.testing.assert_allclose(pushed(made, False), pushed(ARM, True), atol=5e-3)
+    assert np.abs(pushed(made, False) - pushed(ARM, False)).max() > 0.1
+
+
+def test_comments_and_order_stay_and_what_was_there_of_friction_goes():
+    made = export(model(), {}).files["arm.xml"]
+    assert isinstance(made, str)
+    assert "<!-- <joint name='elbow'/> as drawn -->" in made
+    before, after = (
+        [line for line in text.splitlines() if "joint" not in line and "frictionloss" not in line]
+        for text in (COMMENTED, made)
+    )
+    assert after == before
+    built = mujoco.MjModel.from_xml_string(made)
+    np.testing.assert_allclose(built.dof_frictionloss, COULOMB)
+    np.testing.assert_allclose(np.ravel(built.dof_damping)[: len(VISCOUS)], VISCOUS)
+    np.testing.assert_array_equal(built.dof_armature, 0.0)
+
+
+def test_springs_and_rotors_are_joints_own_also_in_degrees():
+    spring = fitted("spring", middle=0.2, offset=0.3, k1=1.5)
+    own = model(ARM.replace("<option", '<compiler angle="degree"/><option'), elbow=spring)
+    made = mujoco.MjModel.from_xml_string(export(own, {}).files["arm.xml"])
+    assert made.qpos_spring[2] == pytest.approx(0.2 - 0.3 / 1.5)
+    assert np.ravel(made.jnt_stiffness)[2] == pytest.approx(1.5)
+    rotor = export(model(base=fitted("rotor_inertia", inertia=0.07)), {})
+    assert mujoco.MjModel.from_xml_string(rotor.files["arm.xml"]).dof_armature[0] == 0.07
+    assert "rotor_inertia" in rotor.kept["base"]
+
+
+def test_what_is_lost_is_told_in_newtons_on_a_log():
+    t = np.arange(4000) / 500.0
+    log = arm_of(np.stack([np.sin(t)] * 3, axis=1), np.zeros((4000, 3)))
+    own = model(shoulder=fitted("cogging", p=0.2, a1=0.3), elbow=fitted("spring", k1=1.0, k3=0.2))
+    made = export(own, {"log": log})
+    (lost,) = made.lost
+    assert (lost.axis, lost.part) == ("shoulder", "cogging")
+    assert lost.text == "0.2 of its 0.2 N m RMS are lost on log"
+    (nearly,) = made.approximated
+    assert (nearly.axis, nearly.part) == ("elbow", "spring")
+    assert attributes_of(own.axes["elbow"])["stiffness"] == 1.0
+
+
+def test_the_command_writes_the_file_that_it_is_given(tmp_path):
+    save_model(model(), tmp_path / "arm.toml")
+    done = twin("export", "arm.toml", "--to", "mjcf", "-o", "fitted.xml", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    built = mujoco.MjModel.from_xml_path(str(tmp_path / "fitted.xml"))
+    np.testing.assert_allclose(built.dof_frictionloss, COULOMB)
+    plain = MachineModel("plain", {"x": AxisModel(1.0)}, 1000.0)
+    save_model(plain, tmp_path / "plain.toml")
+    said = refusal("export", "plain.toml", "--to", "mjcf", "-o", "x.xml", folder=tmp_path)
+    assert "has no MuJoCo file to write back" in said

@@ -1,0 +1,176 @@
+"""MJCF: the machine's own MuJoCo file with what its joints can hold of the model.
+
+Friction, damping, springs and rotor inertia are attributes of a joint; each effect says which of
+them hold it (``Effect.joint_attributes``). The text of the file stays as it is, but for these. What
+they lose of an effect is told along logs: the force that it makes in the model less that of
+
+    -frictionloss sgn(v) - damping v - stiffness (q - springref)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from twin.core.walks import walk
+from twin.effect import Kind
+from twin.errors import InputError
+from twin.export import Exported, Exporter, Remark
+from twin.logs import Log
+from twin.model.machine import AxisModel, MachineModel, axis_table
+from twin.mujoco.mechanism import PASSIVE, read_bodies
+from twin.mujoco.mjcf import read_spec
+from twin.signals import Array, between
+
+Attributes = Mapping[str, float]
+KEPT = 0.01  # least part of an effect's force that is told to be lost
+HALF = 0.5  # where more is lost than held, the effect is called lost
+SWING, SAMPLE = 10.0, 1e-3  # s, of the sine over the travel on which losses are told without a log
+_JOINT = re.compile(r"<!--.*?-->|<joint\b(?:[^>\"']|\"[^\"]*\"|'[^']*')*>", re.DOTALL)
+
+
+def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
+    """The MJCF file with the joints' attributes; of a URDF file the MJCF file that it makes."""
+    if model.mjcf is None:
+        raise InputError(
+            f"{model.name}: has no MuJoCo file to write back; give the model mujoco = 'robot.xml', "
+            "or begin with `twin new LOG --mjcf robot.xml`"
+        )
+    name = model.mjcf_name or "model.xml"
+    text = _in_mjcf(model.mjcf, name)
+    for axis, own in model.axes.items():
+        text = _with_attributes(text, name, axis, own)
+    judged = {axis: _judged(model, axis, logs) for axis in model.axes}
+    return Exported(
+        {f"{Path(name).stem}.xml": text},
+        {axis: kept for axis, (kept, _, _) in judged.items()},
+        tuple(r for _, nearly, _ in judged.values() for r in nearly),
+        tuple(r for _, _, lost in judged.values() for r in lost),
+    )
+
+
+def _in_mjcf(text: str, name: str) -> str:
+    """The text itself, or what a URDF text is in MJCF."""
+    if "<mujoco" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).lstrip()[:200]:
+        return text
+    spec = read_bodies(text, name)
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def attributes_of(axis: AxisModel) -> dict[str, float]:
+    """The attributes of the joint that hold the effects of an axis, those that are not zero."""
+    found: dict[str, float] = {}
+    for f in axis.effects:
+        if f.effect.joint_attributes is not None:
+            for key, value in f.effect.joint_attributes(f.values).items():
+                found[key] = found.get(key, 0.0) + value
+    return found
+
+
+def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
+    """The text with the attributes of one joint; what was there of friction and springs goes."""
+    joint, wanted = own.joint or axis, attributes_of(own)
+    spec = read_spec(text, name)
+    there = spec.joint(joint)
+    if there is None:
+        raise InputError(f"{name}: has no joint '{joint}', which is axis {axis}; name them alike")
+    given = {key: np.ravel(getattr(there, key)) for key in PASSIVE}
+    new = {
+        key: wanted.get(key, 0.0)
+        for key, values in given.items()
+        if values[0] != wanted.get(key, 0.0) or np.any(values[1:])
+    }
+    if "springref" in wanted:
+        in_degrees = spec.compiler.degree and own.rotary
+        new["springref"] = np.degrees(wanted["springref"]) if in_degrees else wanted["springref"]
+
+    def changed(found: re.Match[str]) -> str:
+        tag = found[0]
+        named = re.search(r"\sname\s*=\s*[\"']([^\"']*)[\"']", tag)
+        if tag.startswith("<!--") or named is None or named[1] != joint or "joint1" in tag:
+            return tag
+        for key, value in new.items():
+            own_text, pattern = f'{key}="{value:.9g}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
+            tag, count = re.subn(pattern, own_text, tag)
+            if not count:
+                tag = re.sub(r"\s*(/?>)$", rf" {own_text}\1", tag)
+        return tag
+
+    return _JOINT.sub(changed, text)
+
+
+def _judged(
+    model: MachineModel, axis: str, logs: Mapping[str, Log]
+) -> tuple[tuple[str, ...], list[Remark], list[Remark]]:
+    """Which effects of an axis the joint holds, holds nearly, and does not hold."""
+    own, unit = model.axes[axis], model.axes[axis].units.force
+    motions = [_motion(log.axes[axis].position, log.period) for log in logs.values()]
+    on = ", ".join(logs) or "a sine over its travel"
+    motions = motions or [_swing(own)]
+    kept: list[str] = []
+    nearly: list[Remark] = []
+    lost: list[Remark] = []
+    for f in own.effects:
+        alone = AxisModel(own.mass, effects=(f,), rotary=own.rotary)
+        held = f.effect.joint_attributes(f.values) if f.effect.joint_attributes else {}
+        if f.effect.kind is Kind.STRUCTURE and held:  # an inertia, which is what it is
+            kept.append(f.effect.name)
+            continue
+        size, left = _sizes(alone, held, motions)
+        if held and left <= KEPT * size:
+            kept.append(f.effect.name)
+        elif size == 0.0:
+            text = (
+                "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
+            )
+            lost.append(Remark(axis, f.effect.name, text))
+        else:
+            text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {on}"
+            (lost if left > HALF * size else nearly).append(Remark(axis, f.effect.name, text))
+    return tuple(kept), nearly, lost
+
+
+def _sizes(
+    alone: AxisModel, held: Attributes, motions: list[tuple[Array, float]]
+) -> tuple[float, float]:
+    """N RMS of one effect while the axis moves, and of what the attributes lose of it."""
+    whole, left = [], []
+    for motion, period in motions:
+        table = axis_table({"": alone})
+        rows = np.zeros((len(table.entries), motion.shape[1]))
+        first, last, state, _, _ = table.axes[0]
+        walk(
+            table.entries, first, last, table.parameters, np.zeros(table.n_states), state, motion,
+            np.zeros_like(motion), period, 0, rows, alone.mass,
+        )  # fmt: skip
+        x, v = motion[:2]
+        force = -held.get("frictionloss", 0.0) * np.sign(v) - held.get("damping", 0.0) * v
+        force -= held.get("stiffness", 0.0) * (x - held.get("springref", 0.0))
+        made = rows.sum(axis=0)
+        whole.append(made[v != 0.0])
+        left.append((made - force)[v != 0.0])
+    sizes = (np.concatenate(parts) for parts in (whole, left))
+    size, loss = (float(np.sqrt(np.mean(s**2))) if len(s) else 0.0 for s in sizes)
+    return size, loss
+
+
+def _motion(position: Array, period: float) -> tuple[Array, float]:
+    """Position, velocity and no force (3, n) between the samples of a log, and its period, s."""
+    velocity = between(position, period)
+    middle = 0.5 * (position[1:] + position[:-1])
+    return np.stack([middle, velocity, np.zeros_like(velocity)]), period
+
+
+def _swing(axis: AxisModel) -> tuple[Array, float]:
+    """A sine over the travel at the fastest move's speed."""
+    low, high = axis.hardware.travel or (-1.0, 1.0)
+    reach = 0.5 * (high - low)
+    turn = axis.hardware.velocity / reach * np.arange(0.0, SWING, SAMPLE)
+    return _motion(0.5 * (low + high) + reach * np.sin(turn), SAMPLE)
+
+
+EXPORTER = Exporter("the machine's own MuJoCo file with the joints' friction and springs", export)
