@@ -40,17 +40,17 @@ def test_planted_friction_is_found(folder):
 
 def cogging(q, v):
     """On the shoulder."""
-    return friction(q, v) + [0.0, 0.25 * np.sin(2.0 * np.pi * q[1] / 0.2), 0.0]
+    return friction(q, v) + np.array([0.0, 0.25 * np.sin(2.0 * np.pi * q[1] / 0.2), 0.0])
 
 
 def counterbalance(q, v):
     """On the elbow."""
-    return friction(q, v) - [0.0, 0.0, 0.3 * np.sin(q[2] + 0.3)]
+    return friction(q, v) - np.array([0.0, 0.0, 0.3 * np.sin(q[2] + 0.3)])
 
 
 def coupled(q, v):
     """The elbow's motor turns with the shoulder as well."""
-    return friction(q, v) - [0.0, 0.0, 0.15 * np.tanh((v[1] + v[2]) / STEEP)]
+    return friction(q, v) - np.array([0.0, 0.0, 0.15 * np.tanh((v[1] + v[2]) / STEEP)])
 
 
 def rotor(model):
