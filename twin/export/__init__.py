@@ -76,6 +76,17 @@ def find_exporter(name: str) -> Exporter:
     return found
 
 
+def axis_identifiers(model: MachineModel) -> dict[str, str]:
+    """Each axis' name as one of a program; InputError where two of them are the same there."""
+    names = {axis: identifier(axis) for axis in model.axes}
+    for axis, name in names.items():
+        if list(names.values()).count(name) > 1:
+            raise InputError(
+                f"axis {axis}: is called {name} in an export, as another is; give it another name"
+            )
+    return names
+
+
 def identifier(name: str) -> str:
     """A name as one of a program: small letters, digits and _."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "model"

@@ -12,7 +12,7 @@ from math import ceil
 from twin.core.native import LONGEST_STEP
 from twin.effect import IO_SIZE, Kind
 from twin.errors import InputError
-from twin.export import Remark, identifier
+from twin.export import Remark, axis_identifiers, identifier
 from twin.export.c_law import SLOTS, CannotTranslate, CLaws
 from twin.feedforward import followed
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -70,7 +70,7 @@ def c_source(model: MachineModel) -> CSource:
             "motion of all of them; give a model of one axis with a mass"
         )
     model.require_mass()
-    name, laws = identifier(model.name), CLaws()
+    name, names, laws = identifier(model.name), axis_identifiers(model), CLaws()
     axes: list[AxisCode] = []
     approximated: list[Remark] = []
     lost: list[Remark] = []
@@ -89,11 +89,7 @@ def c_source(model: MachineModel) -> CSource:
                 nearly[f.effect.name] = "the acceleration is held from one call to the next"
         approximated += [Remark(axis_name, *item) for item in nearly.items()]
         lost += [Remark(axis_name, *item) for item in left.items()]
-        prefix = f"{name}_{identifier(axis_name)}"
-        if prefix in {a.prefix for a in axes}:
-            raise InputError(
-                f"axes: two are called {prefix} in C; give the axis '{axis_name}' another name"
-            )
+        prefix = f"{name}_{names[axis_name]}"
         more = tuple(f"other_{m}" for m in MOTION) if _reads_other(made) else ()
         axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), (*MOTION, *more)))
     remarks = tuple(approximated), tuple(lost)

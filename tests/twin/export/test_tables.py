@@ -11,6 +11,7 @@ import pytest
 from cli_runs import refusal, twin
 from effect_runs import CATALOGUE
 
+from twin.errors import InputError
 from twin.export import find_exporter
 from twin.export.tables import fewest_points, motions, tables
 from twin.feedforward import feedforward
@@ -134,6 +135,14 @@ def test_losses_are_told_on_the_logs_that_are_given(tmp_path) -> None:
     write_log(Log(1000.0, {"x": AxisLog(columns)}), tmp_path / "bare.mcap")
     line = refusal("export", "m.toml", "bare.mcap", "--to", "csv", folder=tmp_path)
     assert "setpoint_position" in line
+
+
+@pytest.mark.parametrize("name", ["c", "csv", "twincat", "ros2_control", "fmu"])
+def test_axes_that_would_have_one_name_are_refused(name) -> None:
+    axis = AxisModel(3.0, HARDWARE)
+    model = MachineModel("two", {"x": axis, "X": axis}, 1000.0)
+    with pytest.raises(InputError, match="another name"):
+        find_exporter(name).export(model, {})
 
 
 def test_a_rotary_axis_has_its_own_units() -> None:

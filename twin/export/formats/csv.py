@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twin.export import Exported, Exporter, identifier
+from twin.export import Exported, Exporter, axis_identifiers
 from twin.export.tables import AxisTables, judged, motions
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
@@ -18,8 +18,9 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     given = motions(model, logs)
     found = {name: judged(model, name, given, lambda t: t) for name in model.axes}
     files: dict[str, str | bytes] = {}
+    names = axis_identifiers(model)
     for name, axis in model.axes.items():
-        files |= _files(identifier(name), axis, found[name].tables)
+        files |= _files(names[name], axis, found[name].tables)
     return Exported(
         files,
         {name: own.kept for name, own in found.items()},

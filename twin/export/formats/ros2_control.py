@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from twin.export import Exported, Exporter, identifier
+from twin.export import Exported, Exporter, axis_identifiers, identifier
 from twin.export.tables import AxisTables, judged, motions
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
@@ -25,11 +25,11 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """The limits as YAML, and the joints as a piece of a robot's description."""
     given = motions(model, logs)
     found = {name: judged(model, name, given, _straight) for name in model.axes}
-    name = identifier(model.name)
+    name, names = identifier(model.name), axis_identifiers(model)
     limits, joints = ["joint_limits:"], []
     for axis, own in model.axes.items():
-        limits += [f"  {identifier(axis)}:", *(f"    {line}" for line in _limits(own))]
-        joints.append(_joint(identifier(axis), own, found[axis].tables))
+        limits += [f"  {names[axis]}:", *(f"    {line}" for line in _limits(own))]
+        joints.append(_joint(names[axis], own, found[axis].tables))
     described = "\n".join([f"<robot name={quoteattr(name)}>", *joints, "</robot>\n"])
     return Exported(
         {f"{name}_joint_limits.yaml": "\n".join(limits) + "\n", f"{name}_joints.urdf": described},

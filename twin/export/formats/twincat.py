@@ -12,7 +12,7 @@ from math import degrees
 
 import numpy as np
 
-from twin.export import Exported, Exporter, Remark, identifier
+from twin.export import Exported, Exporter, Remark, axis_identifiers
 from twin.export.formats.csv import csv_text
 from twin.export.tables import ENTRIES, AxisTables, Judged, fewest_points, judged, motions
 from twin.logs import Log
@@ -29,8 +29,9 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     found = {name: judged(model, name, given, _held) for name in model.axes}
     files: dict[str, str | bytes] = {}
     nearly: list[Remark] = []
+    names = axis_identifiers(model)
     for name, axis in model.axes.items():
-        files |= _files(identifier(name), axis, found[name])
+        files |= _files(names[name], axis, found[name])
         nearly += [Remark(name, "friction table", _points(axis, found[name].tables))]
     return Exported(
         files,
