@@ -17,7 +17,14 @@ from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory import AnySetpoint
 from twin.instability import require_sound
 from twin.model.machine import MachineModel
-from twin.mujoco.callback import USER_HEADER, attach, offsets, passive_callback, step_address
+from twin.mujoco.callback import (
+    USER_HEADER,
+    Driven,
+    attach,
+    offsets,
+    passive_callback,
+    step_address,
+)
 
 CHUNK = 20_000  # samples that are run, reported and recorded at once
 WATCHED_STATES = 8  # an effect with more states than this is not logged state by state
@@ -74,22 +81,24 @@ class MujocoSimulator:
     def __init__(self, model: MachineModel, table: Table) -> None:
         import mujoco
 
+        from twin.mujoco.mechanism import driven, jointed_spec
         from twin.mujoco.mjcf import machine_spec
 
-        spec = machine_spec(model)
-        axes = tuple(model.axes)
+        if model.joints:
+            spec, axes = jointed_spec(model), driven(model)
+        else:
+            spec = machine_spec(model)
+            pairs = zip(model.axes, table.masses, strict=True)
+            axes = [Driven(a, f"motor_{a}", mass) for a, mass in pairs]
         self.user_at = attach(spec, table, model.period, axes)
         # A bad state stays bad, and is found, instead of starting again from zero.
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.model = spec.compile()
         self._machine, self._table = model, table
         self.data = mujoco.MjData(self.model)
-        joints = [self.model.joint(a) for a in axes]
+        joints = [(self.model.joint(a.joint), self.model.actuator(a.motor)) for a in axes]
         self._where = np.array(
-            [
-                (joint.qposadr[0], joint.dofadr[0], self.model.actuator(f"motor_{a}").id)
-                for a, joint in zip(axes, joints, strict=True)
-            ]
+            [(joint.qposadr[0], joint.dofadr[0], motor.id) for joint, motor in joints]
         )
         self._attached = self._attached_joints()
         self._step = step_address()
@@ -145,6 +154,11 @@ class ReducedSimulator:
     substeps = 1  # integration steps a sample
 
     def __init__(self, model: MachineModel, table: Table) -> None:
+        if model.joints:
+            raise CannotRun(
+                f"{model.name}: its axes are joints of {model.mjcf_name}, which move each other; "
+                "such a machine is simulated in MuJoCo alone"
+            )
         self._motion = np.zeros((len(model.axes), 2))
         self._states = np.zeros(table.n_states)
         self._masses = table.masses

@@ -17,6 +17,7 @@ from identify.dataset.noise_floor import noise_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
 from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY
+from twin.errors import CannotRun
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_cubic
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
@@ -46,9 +47,17 @@ def free_run(
     """Run the model on the commands of one log, prepared for each of its axes.
 
     noise: generator of measurement noise of the log's level, added to its readings and commands;
-    no noise is added where None. Raises CannotRun where the motion of an axis is imposed.
+    no noise is added where None. Raises CannotRun where the motion of an axis is imposed, and
+    where one of several joints does not move.
     """
     model.require_mass()
+    if model.joints:  # which move each other
+        simulator = MujocoSimulator
+        if lacking := [axis for axis in model.axes if axis not in logs]:
+            raise CannotRun(
+                f"axis {', '.join(lacking)} does not move in the log, and what holds it there is "
+                "not known; give a log in which all joints move"
+            )
     model = as_logged(model, logs)
     position, command = _signals(model, logs, noise)
     n, period = len(position), model.period

@@ -7,9 +7,14 @@ import pytest
 from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, friction
 from cli_runs import refusal, twin
 
-from identify.workflow import diagnose, fit
+from identify.estimation.open_loop import open_loop
+from identify.workflow import compare, diagnose, fit
+from twin.effects import load_catalogue
 from twin.logs import write_log
 from twin.model.file import load_model
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.mujoco.mechanism import joints_of
+from twin.simulator import MujocoSimulator
 
 NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
@@ -36,6 +41,35 @@ def test_planted_friction_is_found(folder):
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
         assert found.fits[joint].ratio < 1.5
         assert found.datasets[joint].channel_delay == 0.0
+
+
+def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder):
+    model = load_model(folder / "arm.toml")
+    less = model.with_axis("shoulder", model.axes["shoulder"].without("coulomb_viscous"))
+    whole, lacking = (compare(m, folder / "2.mcap").axes for m in (model, less))
+    for joint in JOINTS:
+        (error,), (noise,) = (
+            whole[joint].position_error.values(),
+            whole[joint].position_floor.values(),
+        )
+        assert error < 3.0 * noise < 2e-3
+    assert max(*lacking["shoulder"].position_error.values()) > 0.02
+
+
+def test_friction_holds_an_arm_against_its_weight():
+    held = {"Fc": 30.0, "Fs": 40.0, "sigma2": 0.1}  # N m; its weight takes 16 N m at the shoulder
+    friction = Fitted.at_start(load_catalogue()["coulomb_viscous"], held)
+    bodies = joints_of(ARM, "arm.xml", {joint: joint for joint in JOINTS})
+    axes = {
+        joint: AxisModel(b.inertia, effects=(friction,), mass_fixed=True, rotary=True, joint=joint)
+        for joint, b in bodies.items()
+    }
+    model = MachineModel("arm", axes, 1000.0, ARM, "arm.xml")
+    table = model.table()
+    simulator = MujocoSimulator(model, table)
+    simulator.place(np.zeros(3), np.zeros(3), np.zeros(table.n_states), 0)
+    position = open_loop(model, table, simulator, 0, np.zeros((2000, 3)))
+    assert np.abs(position).max() < 1e-3
 
 
 def cogging(q, v):

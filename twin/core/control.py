@@ -40,12 +40,13 @@ class Controller:
     def for_axis(cls, axis: AxisModel) -> Controller:
         """Gains for the axis' bandwidth: double the phase lead of a PD at damping 0.7."""
         omega = 2.0 * math.pi * axis.hardware.bandwidth
+        mass = axis.mass if axis.joint is None else axis.weighed.mass
         return cls(
-            proportional=axis.mass * omega**2 / 3.0,
-            integral=axis.mass * omega**3 / 30.0,
-            derivative=axis.mass * omega,
+            proportional=mass * omega**2 / 3.0,
+            integral=mass * omega**3 / 30.0,
+            derivative=mass * omega,
             filter_bandwidth=6.0 * axis.hardware.bandwidth,
-            mass=axis.mass,
+            mass=mass,
         )
 
 

@@ -29,6 +29,7 @@ from twin.effect import (
     DT,
     FRICTION,
     HOLD,
+    LOAD,
     MASS,
     MOVED,
     NET,
@@ -154,8 +155,8 @@ def slope(values, k, dt):
 
 
 # States every axis has before those of its effects.
-LAST_FRICTION, LAST_VELOCITY, LAST_ACCELERATION = range(3)
-AXIS_STATES = 3
+LAST_FRICTION, LAST_VELOCITY, LAST_ACCELERATION, LAST_NET = range(4)
+AXIS_STATES = 4
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
@@ -167,7 +168,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     """Forces on one axis, N: (of actuator and effects, of its structure); states advance a sample.
 
     entries (n, 4); parameters, states, io: flat doubles; at: where this axis' states begin.
-    io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, WHEN and the other axis on entry.
+    io holds INDEX, TIME, DT, X, V, U, MASS, MOVED, LOAD, WHEN and the other axis on entry.
     rows[k, i] receives the force that entry i puts on the axis.
     """
     rate = 1.0 / io[DT]
@@ -192,6 +193,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
         stop += share * answered[0] + answered[2]
         stop /= moving
         io[MASS] = mass / moving
+    stop -= io[LOAD]
     total = 0.0
     friction = 0.0
     for i in range(first, structure):
@@ -219,6 +221,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
     if structure < last:
         added = settle(entries, structure, last, p, s, io, net, answered, rows, k)
     own[LAST_FRICTION] = friction
+    own[LAST_NET] = net
     own[LAST_ACCELERATION] = (io[V] - own[LAST_VELOCITY]) * rate
     own[LAST_VELOCITY] = io[V]
     return net, added

@@ -332,15 +332,10 @@ class MachineModel:
     @property
     def is_imposed(self) -> bool:
         """Whether the motion of an axis is imposed, so that no motion can be simulated."""
-        return bool(self.joints) or any(axis.is_imposed for axis in self.axes.values())
+        return any(axis.is_imposed for axis in self.axes.values())
 
     def require_mass(self) -> None:
         """Raise CannotRun where the motion of an axis is imposed."""
-        if self.joints:
-            raise CannotRun(
-                f"{self.name}: its axes are joints of {self.mjcf_name}, whose motion is not "
-                "simulated yet; its forces are fitted and compared"
-            )
         for name, axis in self.axes.items():
             if axis.is_imposed:
                 mass, unit = axis.units.mass_name, axis.units.mass

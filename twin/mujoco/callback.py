@@ -11,7 +11,7 @@ first sample, as INDEX is computed from it; the time origin is beside the states
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -24,14 +24,16 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from twin.core.compiled import callback, compiled, doubles_at
-from twin.core.native import LAST_ACCELERATION, Table, axis_force
+from twin.core.native import LAST_ACCELERATION, LAST_NET, LAST_VELOCITY, Table, axis_force
 from twin.effect import (
     A_OTHER,
     DT,
     INDEX,
     IO_SIZE,
+    LOAD,
     MASS,
     MOVED,
+    SPEEDS,
     TIME,
     V_OTHER,
     WHEN,
@@ -50,7 +52,7 @@ NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
 HEADER = 6  # period, axes, states, entries, parameters, first userdata
 USER_HEADER = 2  # time of the last call, s; time origin, s; then the states
-AXIS_COLUMNS = 7  # first entry, last entry, first state, mass, qpos, dof, actuator
+AXIS_COLUMNS = 8  # first entry, last entry, first state, mass, qpos, dof, actuator, rotor
 
 
 class Offsets(NamedTuple):
@@ -216,6 +218,13 @@ def passive_forces(block, data, off):
     io[DT] = dt
     io[WHEN] = 1.0
     for a in range(n_axes):
+        if axes[a, 7] >= 0.0:
+            io[SPEEDS + a] = qvel[int(axes[a, 5])]
+    for a in range(n_axes):
+        if axes[a, 7] >= 0.0:  # what the bodies took: all forces of the sample before, less rotor's
+            own = int(axes[a, 2])
+            gained = (qvel[int(axes[a, 5])] - start[own + LAST_VELOCITY]) / dt
+            io[LOAD] = start[own + LAST_NET] - axes[a, 7] * gained
         io[X] = qpos[int(axes[a, 4])]
         io[V] = qvel[int(axes[a, 5])]
         io[U] = ctrl[int(axes[a, 6])]
@@ -254,17 +263,30 @@ def _callback(off: Offsets) -> Any:
     return callback(passive, types.void(types.int64, types.int64))
 
 
-def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: tuple[str, ...]) -> int:
+class Driven(NamedTuple):
+    """An axis in a spec: its joint and motor, and the mass (kg) by which friction stops it.
+
+    rotor: kg, of its own inertia beside the bodies of a mechanism; below 0 on a plain axis.
+    """
+
+    joint: str
+    motor: str
+    mass: float
+    rotor: float = -1.0
+
+
+def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: Sequence[Driven]) -> int:
     """Write the table into the spec; returns where its userdata begins.
 
-    axes: names of the slide joints, in the table's order; each has a motor ``motor_<axis>``.
+    axes: in the table's order.
     """
     model = spec.compile()
     user_at = model.nuserdata
     spans = []
-    for axis, (first, last, state, _, _), mass in zip(axes, table.axes, table.masses, strict=True):
-        joint, motor = model.joint(axis), model.actuator(f"motor_{axis}")
-        spans.append((first, last, state, mass, joint.qposadr[0], joint.dofadr[0], motor.id))
+    for axis, (first, last, state, _, _) in zip(axes, table.axes, strict=True):
+        joint, motor = model.joint(axis.joint), model.actuator(axis.motor)
+        at = joint.qposadr[0], joint.dofadr[0], motor.id
+        spans.append((first, last, state, axis.mass, *at, axis.rotor))
     # Doubles hold any address below 2^53 exactly, so that a table can travel in an mjModel.
     numbers = [
         period, len(axes), table.n_states, len(table.entries), len(table.parameters), user_at,

@@ -30,8 +30,9 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from twin.core.compiled import compiled
-from twin.errors import InputError
-from twin.mujoco.callback import call_step, library, offsets, view, word_at
+from twin.errors import CannotRun, InputError
+from twin.model.machine import MachineModel
+from twin.mujoco.callback import Driven, call_step, library, offsets, view, word_at
 from twin.mujoco.mjcf import read_spec
 from twin.signals import Array
 
@@ -76,13 +77,14 @@ class Mechanism:
 
     model: of the bodies alone. places (2, n_axes): of each axis in qpos and among the degrees of
     freedom. inertia (n_axes,): kg or kg m^2, that of the bodies about each joint, the mean over
-    poses.
+    poses. freed (n_axes,): the least that is felt at each where all others are free.
     """
 
     model: mujoco.MjModel
     axes: tuple[str, ...]
     places: NDArray[np.int64]
     inertia: Array
+    freed: Array
 
     def __repr__(self) -> str:
         return f"<Mechanism of {', '.join(self.axes)}>"
@@ -117,8 +119,7 @@ def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:
 def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mechanism:
     spec = read_bodies(text, name)
     for joint in spec.joints:
-        for key in PASSIVE:
-            setattr(joint, key, 0.0 * np.asarray(getattr(joint, key)))
+        _strip(joint)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -129,7 +130,7 @@ def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mec
     at = [found[joint] for _, joint in joints]
     places = np.stack([model.jnt_qposadr[at], model.jnt_dofadr[at]]).astype(np.int64)
     axes = tuple(axis for axis, _ in joints)
-    return Mechanism(model, axes, places, _mean_inertia(model)[places[1]])
+    return Mechanism(model, axes, places, *(i[places[1]] for i in _inertias(model)))
 
 
 def _require_measured(
@@ -179,22 +180,74 @@ def joints_of(text: str, name: str, joints: Mapping[str, str]) -> dict[str, Join
     return {axis: Joint(bool(turns), float(inertia)) for axis, turns, inertia in pairs}
 
 
-def _mean_inertia(model: mujoco.MjModel) -> Array:
-    """Inertia (nv,) about each joint, kg or kg m^2: the mean over poses within the joints' ranges.
+def _inertias(model: mujoco.MjModel) -> tuple[Array, Array]:
+    """Inertia (nv,) about each joint, kg or kg m^2, over poses within the joints' ranges.
 
-    In one pose it may vanish, such as that of a straight arm about its own line.
+    With all others held the mean: in one pose it may vanish, such as that of a straight arm about
+    its own line. With all others free the least.
     """
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     turns = model.jnt_type == HINGE
     free = np.where(turns, np.pi, 0.0)[:, None] * [-1.0, 1.0]
     low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free).T
     total, full = np.zeros(model.nv), np.zeros((model.nv, model.nv))
+    least = np.full(model.nv, np.inf)
     for _ in range(POSES):
         data.qpos[model.jnt_qposadr] = rng.uniform(low, high)
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
         total += np.diag(full) / POSES
-    return total
+        least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(full)))
+    return total, least
+
+
+def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
+    """The spec of a machine whose axes are joints: its bodies, a motor each, and the rotors.
+
+    The file's own motors, sensors and limits are not there: the machine model has its own. Raises
+    CannotRun for an effect that hangs bodies on a joint.
+    """
+    name = model.mjcf_name or ""
+    spec = read_bodies(model.mjcf or "", name)
+    for part in (*spec.actuators, *spec.sensors, *spec.keys):
+        spec.delete(part)
+    spec.option.timestep = model.period
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    for axis, own in model.axes.items():
+        for f in own.effects:
+            if f.effect.attach is not None and f.effect.is_present(f.values):
+                raise CannotRun(
+                    f"axis {axis}: {f.effect.name} hangs bodies on a joint of {name}, which is not "
+                    "simulated; put the body and its spring into that file"
+                )
+        joint = spec.joint(own.joint)
+        _strip(joint)
+        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+        joint.armature = own.weighed.mass - own.mass
+        motor = spec.add_actuator(
+            name=f"motor_{axis}", target=own.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
+        motor.gear[0] = 1.0
+    return spec
+
+
+def driven(model: MachineModel) -> list[Driven]:
+    """The axes of such a spec.
+
+    Friction stops a joint by the least inertia that it may have: more than it has would throw it
+    back and forth, less stops it a little later.
+    """
+    found = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    return [
+        Driven(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
+        for (name, axis), least in zip(model.axes.items(), found.freed, strict=True)
+    ]
+
+
+def _strip(joint: mujoco.MjsJoint) -> None:
+    """Take from a joint what is the matter of effects."""
+    for key in PASSIVE:
+        setattr(joint, key, 0.0 * np.asarray(getattr(joint, key)))
 
 
 def _addresses() -> tuple[int, ...]:
