@@ -53,7 +53,7 @@ def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder
             whole[joint].position_floor.values(),
         )
         assert error < 3.0 * noise < 2e-3
-    assert max(*lacking["shoulder"].position_error.values()) > 0.02
+    assert max(lacking["shoulder"].position_error.values()) > 0.02
 
 
 def test_friction_holds_an_arm_against_its_weight():

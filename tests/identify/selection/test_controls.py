@@ -35,7 +35,9 @@ SIZE = 0.05  # N RMS beside what the base takes, 50 times the noise
 SEEN = Excitation(-0.05, 0.05, 0.3, 0.3, 3.0, 1.0 / RATE)
 STICKY = Fitted.at_start(CATALOGUE["lugre"])
 PHYSICAL = [
-    e for e in CATALOGUE.values() if e.strengths and not (e.is_nonparametric or is_noise(e))
+    e
+    for e in CATALOGUE.values()
+    if e.strengths and not (e.is_nonparametric or is_noise(e) or e.of_joints)
 ]
 FRICTIONS = [e for e in PHYSICAL if e.kind is Kind.FRICTION]
 OTHERS = [e for e in PHYSICAL if e.kind is not Kind.FRICTION]

@@ -13,7 +13,8 @@ from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 BOTH = pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
-EVERY = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda e: e.name)
+OF_AXES = [e for e in CATALOGUE.values() if not e.of_joints]
+EVERY = pytest.mark.parametrize("effect", OF_AXES, ids=lambda e: e.name)
 Stepper = type[MujocoSimulator] | type[ReducedSimulator]
 
 RATE = 5000.0  # Hz
