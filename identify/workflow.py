@@ -13,9 +13,8 @@ from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.preparation import datasets
+from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import sticks
-from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned, fit_aligned
 from identify.estimation.confounded import refit
 from identify.estimation.fit import Fit, error_if_any

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.floor import NoiseFloor
 from identify.dataset.motion import Motion
+from identify.dataset.noise_floor import NoiseFloor
 from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished

@@ -3,7 +3,7 @@
 import numpy as np
 from constructed import log_of, waves, windowed
 
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 
 RATE, MASS = 4000.0, 1.7
 PLACE = waves((0.03, 1.3, 0.4), (0.004, 3.1, 1.0))

@@ -14,9 +14,9 @@ from constructed import log_of
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import on_blocks, total_force
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from twin.effects import Catalogue

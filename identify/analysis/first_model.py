@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.dataset.bodies import bodies_along
-from identify.dataset.excitation import excitation
+from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import Motion
+from identify.dataset.motion import Motion, bodies_along, motion_of
 from identify.dataset.prepared_log import at_rest
-from identify.dataset.reading_ripple import ripples_of_widest
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from twin.checks import moves
 from twin.effect import Excitation, Kind

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.channel_delay import fit_aligned
 from identify.estimation.intervals import scatter
 from twin.core.control import Controller

@@ -1,4 +1,4 @@
-"""What a force may depend on: the coordinates of each test function of a log."""
+"""What a force may depend on, of each test function of a log, and what the motions cover."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identify.dataset.dataset import ENOUGH
+from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, last_direction
+from identify.dataset.spectrum import Record, find_lines, lines_in_time
+from twin.effect import Excitation
 from twin.signals import Array
 
 QUANTITIES = ("position", "velocity", "acceleration")
 OTHER = "other_axis_"
+FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 
 
 def beside(axis: str, quantity: str) -> str:
@@ -57,3 +62,71 @@ def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
     parts = [coordinates_of(log) for log in logs]
     common = [k for k in parts[0] if all(k in p for p in parts)]
     return {k: np.concatenate([p[k] for p in parts]) for k in common}
+
+
+def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
+    """What the motions of one axis cover together; ``travel`` (m) of the axis where it is known."""
+    position = np.concatenate(
+        [m.position for m in motions] + ([np.array(travel)] if travel else [])
+    )
+    velocity = np.concatenate([m.velocity for m in motions])
+    command = np.concatenate([m.net for m in motions])
+    fast = 0.02 * np.abs(velocity).max()
+    ahead, behind = command[velocity > fast], command[velocity < -fast]
+    if len(ahead) and len(behind):
+        gap = np.median(ahead) - np.median(behind)
+    else:
+        gap = 2.0 * np.median(np.abs(command))
+    heard = [m.head(ENOUGH / len(motions)) for m in motions]  # what repeats does so in them too
+    force = float(np.abs(command).max())
+    return Excitation(
+        position_low=float(position.min()),
+        position_high=float(position.max()),
+        speed_max=float(np.abs(velocity).max()),
+        dry_level=float(max(abs(gap) / 2.0, np.sqrt(np.finfo(float).eps) * force)),
+        duration=float(sum(len(m.time) * m.period for m in motions)),
+        period=motions[0].period,
+        force_max=force,
+        lines=lines(heard),
+        ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
+        resolution=max(m.resolution for m in motions),
+        other_joints=_other_joints(motions[0]),
+    )
+
+
+def _other_joints(motion: Motion) -> tuple[float, ...]:
+    """Numbers of the other joints of a mechanism."""
+    if motion.bodies is None:
+        return ()
+    return tuple(float(j) for j in range(len(motion.bodies.speeds)) if j != motion.bodies.index)
+
+
+def lines(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Frequencies (Hz) at which the force of logs repeats in time, the surest first.
+
+    The force is the command less what acceleration, direction, speed and position explain.
+    """
+    return lines_in_time([(_rest(m), m.period) for m in motions])
+
+
+def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
+    """Periods (m) at which an error of the reading would repeat in position, strongest first.
+
+    An error A sin(2 pi x/p) looks like a force m A (2 pi v/p)^2 sin(2 pi x/p), so the force weighed
+    by v^2 has a line in position.
+    """
+    position = np.concatenate([m.position for m in motions])
+    record = Record(position, np.concatenate([_rest(m) * m.velocity**2 for m in motions]))
+    if record.span <= 0.0:
+        return ()
+    found = find_lines([record], FEWEST_CYCLES / record.span, np.inf)
+    return tuple(line.period for line in found)
+
+
+def _rest(motion: Motion) -> Array:
+    """Force that a rough model leaves, (n,) N."""
+    x, v = motion.position, motion.velocity
+    rows = np.stack([motion.acceleration, np.sign(v), v, np.ones_like(x), x, x**2, x**3], axis=1)
+    rows /= np.maximum(np.abs(rows).max(axis=0), np.finfo(float).tiny)
+    solution = np.linalg.lstsq(rows, motion.net, rcond=None)[0]
+    return np.asarray(motion.net - rows @ solution)

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.dataset.dataset import Role
-from identify.dataset.recorded_motion import SHORTEST_LOG, other_axes
-from identify.dataset.shared_samples import share_samples
+from identify.dataset.motion import SHORTEST_LOG, other_axes
 from twin.checks import moves
 from twin.errors import InputError
-from twin.logs import Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel
-
-Array = NDArray[np.float64]
-
+from twin.signals import Array
 
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
+WINDOWS = 8  # of the shorter of two logs, evenly spaced, that are sought in the longer one
+CELLS = 1000.0  # into which the range of positions is divided
+CROSSED = 32  # of which so many are entered within a window
 READ_IF_LOGGED = ("velocity", "setpoint_position")
 BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
@@ -114,3 +113,66 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
             f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
             f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
         )
+
+
+def share_samples(one: Log, other: Log) -> bool:
+    """Whether a stretch of one log, in which an axis moves, is in the other sample by sample.
+
+    Be it at another place in each. Of distinct runs not even the same program and a coarse encoder
+    give the same readings and commands for long while an axis moves. At rest they may, so that
+    windows with motion are compared. A log of an axis at rest, with the noise of its encoder, is
+    not used for that axis.
+    """
+    shorter, longer = sorted((one, other), key=len)
+    return any(
+        _share(shorter.axes[axis], longer.axes[axis]) and moves(shorter, axis)
+        for axis in shorter.axes
+        if axis in longer.axes
+    )
+
+
+def _share(shorter: AxisLog, longer: AxisLog) -> bool:
+    """The same of one axis."""
+    both = shorter.columns.keys() & longer.columns.keys()
+    command = next((name for name in ("force", "current") if name in both), None)
+    if command is None:
+        return False
+    sought, given = ((signals.position, signals.columns[command]) for signals in (shorter, longer))
+    return any(
+        _is_in((sought[0][window], sought[1][window]), moving - window.start, given)
+        for window, moving in _with_motion(shorter.position)
+    )
+
+
+def _with_motion(position: Array) -> Iterator[tuple[slice, int]]:
+    """Windows of positions (n,) m in which the axis moves, and a sample of each at which it does.
+
+    They are as long as the motion asks for, but a part of the log at least.
+    """
+    span, least = float(np.ptp(position)), len(position) // WINDOWS
+    if not 0.0 < span < np.inf:
+        return
+    entered = np.flatnonzero(np.diff(np.floor(position * (CELLS / span)))) + 1
+    starts = np.linspace(0, len(position) - least, WINDOWS).astype(int)
+    ends = np.searchsorted(entered, starts) + CROSSED - 1
+    for start, end in zip(starts, ends, strict=True):
+        if end < len(entered):
+            moving = int(entered[end])
+            yield slice(int(start), max(int(start) + least, moving + 1)), moving
+
+
+def _is_in(window: tuple[Array, Array], moving: int, signals: tuple[Array, Array]) -> bool:
+    """Whether position and command of a window are somewhere in longer signals.
+
+    moving: number of a sample at which it moves, which so is at few places of the signals.
+    """
+    n = len(window[0])
+    begins = np.flatnonzero(signals[0] == window[0][moving]) - moving
+    begins = begins[(begins >= 0) & (begins + n <= len(signals[0]))]
+    for k in (moving, *np.linspace(0, n - 1, WINDOWS).astype(int)):  # before all are compared
+        for values, wanted in zip(signals, window, strict=True):
+            begins = begins[values[begins + k] == wanted[k]]
+    return any(
+        all(np.array_equal(s[b : b + n], w) for s, w in zip(signals, window, strict=True))
+        for b in begins
+    )

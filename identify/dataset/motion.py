@@ -7,21 +7,38 @@ samples keep these relations exact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from identify.dataset.reading_ripple import ripple
-from identify.dataset.resolution import resolution_of, rounding
+from identify.dataset.readings import (
+    ENOUGH,
+    resolution_of,
+    ripple,
+    ripple_periods,
+    rounding,
+    together,
+)
+from twin.errors import InputError
+from twin.logs import AxisLog, Log
+from twin.model.machine import MOST_AXES_OF_A_PAIR, MachineModel
 from twin.model.units import LINEAR, AxisUnits
-from twin.signals import Array, between, local_parabola, rate, usual_size
+from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise
 
 READ_BACK = 32  # readings that a controller is supposed to use
-ENOUGH = 200_000  # samples that tell the noise of a command
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
+
+SHORTEST_BLOCK = 1e-3  # s
+LONGEST_BLOCK = 1e-2  # s
+SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
+SHORTEST_LOG = 0.5  # s, a few test functions
+FEWEST_SAMPLES = 64  # of a log; more than those of 1 s where they are slow
+EQUAL = 1e-9  # relative difference by which whole samples may miss a length
+FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
+OF_JOINT = 0.02  # s, over which a joint's position is a parabola that tells its velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +82,8 @@ class Motion:
     the position follows a logged setpoint; None where none was logged. units, other_units: of the
     axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
     more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
-    readings (identify.dataset.velocity); 0 where there is none. ripples: m, periods at which the
-    readings err along the track (identify.dataset.reading_ripple). ahead: s, by which the command
+    readings (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the
+    readings err along the track (identify.dataset.readings). ahead: s, by which the command
     was moved ahead of how it was logged. bodies: of a joint of a mechanism, over as many samples as
     raw; None for a plain axis, whose mass is all that it moves.
     """
@@ -248,3 +265,151 @@ class Motion:
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about."""
         return rounding(self.readings, self.resolution)
+
+
+def motion_of(
+    log: Log,
+    axis: str,
+    name: str,
+    machine: Sequence[str] = (),
+    longest_block: float = LONGEST_BLOCK,
+    ripples: tuple[float, ...] | None = None,
+    bodies: Bodies | None = None,
+) -> Motion:
+    """The motion of one axis of a log.
+
+    machine: the axes of the machine; on one of two axes others that were logged do not matter.
+    longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies:
+    of a joint.
+    Raises InputError where the axis is not in the log, does not move, or is too short.
+    """
+    if axis not in log.axes:
+        raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
+    readings = log.axes[axis].position
+    least = max(SHORTEST_LOG, FEWEST_SAMPLES * log.period)
+    if len(log) * log.period < least:
+        raise InputError(
+            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
+            f"{log.sample_rate:g} Hz, so record longer"
+        )
+    if np.ptp(readings) == 0.0:
+        raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
+    position, weight = together(readings, log.axes[axis].columns.get("velocity"), log.period)
+    ripples = ripple_periods(position) if ripples is None else ripples
+    noise = white_noise(position - ripple(position, ripples))
+    block = _block_samples(position, noise, log.period, longest_block)
+    force = log.axes[axis].force
+    signals = _blocks(*_midpoints(position, force, log.period), block)
+    found = {a: _other(log, a, block) for a in other_axes(log, axis, machine)}
+    several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
+    other = None if several else next(iter(found.values()), None)
+    return Motion(
+        name=name,
+        axis=axis,
+        signals=signals,
+        others=np.zeros_like(signals) if other is None else other.signals,
+        period=block * log.period,
+        start=0.5 * block * log.period,
+        sample_period=log.period,
+        units=log.axes[axis].kind,
+        other_units=LINEAR if other is None else other.units,
+        beside=found if several else {},
+        position_noise=noise,
+        raw=np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]],
+        follows=_follows(log.axes[axis]),
+        velocity_weight=weight,
+        ripples=ripples,
+        bodies=None if bodies is None else bodies.during(slice(block * signals.shape[1])),
+    )
+
+
+def _follows(signals: AxisLog) -> bool | None:
+    """Whether position and setpoint share at least half of their variance; None without setpoint.
+
+    A setpoint that stands still is not followed.
+    """
+    if "setpoint_position" not in signals.columns:
+        return None
+    wanted, position = signals.columns["setpoint_position"], signals.position
+    if np.ptp(wanted) == 0.0 or np.ptp(position) == 0.0:
+        return False
+    return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > FOLLOWS)
+
+
+def other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
+    """The other axes of the log, of the machine alone where that has two."""
+    pair = len(machine) == MOST_AXES_OF_A_PAIR
+    return [a for a in log.axes if a != axis and (a in machine or not pair)]
+
+
+def _other(log: Log, axis: str, block: int) -> OtherAxis:
+    """Another axis of a log in blocks of some samples."""
+    x = log.axes[axis].position
+    position, velocity, _ = _blocks(*_midpoints(x, x, log.period), block)
+    acceleration = rate(velocity, block * log.period)
+    return OtherAxis(np.stack([position, velocity, acceleration]), log.axes[axis].kind)
+
+
+def _block_samples(position: Array, noise: float, period: float, longest: float) -> int:
+    """Samples a block: 1 ms, or as long as the encoder's noise asks for, up to a length (s)."""
+    span = max(round(SHORTEST_BLOCK / period), 1)
+    fastest = np.abs(position[span:] - position[:-span]).max() / (span * period)
+    quiet = np.sqrt(2.0) * noise / (SPEED_NOISE * fastest)
+    most = int(longest / period * (1.0 + EQUAL))
+    return max(min(round(max(SHORTEST_BLOCK, quiet) / period), most), 1)
+
+
+def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:
+    return (
+        0.5 * (position[1:] + position[:-1]),
+        between(position, period),
+        force[:-1],
+    )
+
+
+def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Array:
+    whole = len(position) // samples * samples
+    stacked = np.stack([position[:whole], velocity[:whole], force[:whole]])
+    return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
+
+
+def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
+    """What the bodies take of each axis that is a joint; none for a machine of plain axes.
+
+    Of all joints together: each carries the others. The velocity, of which the momentum is made, is
+    the difference of the readings, as the weak form integrates it by parts; what depends on it
+    otherwise is small and of second order, and takes a smooth one.
+    The force residual of a joint is command - force - d/dt(mass x velocity + momentum). name: of
+    the log. Raises InputError where the log lacks one of the joints.
+    """
+    if not model.joints:
+        return {}
+    from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
+
+    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    for axis in mechanism.axes:
+        if axis not in log.axes:
+            raise InputError(
+                f"{name}: has no axis '{axis}', which is a joint of {model.mjcf_name}; the forces "
+                "of the others depend on its motion, so log it, or take the joint out of the file"
+            )
+    told = [log.axes[axis] for axis in mechanism.axes]
+    position = np.stack(
+        [together(a.position, a.columns.get("velocity"), log.period)[0] for a in told]
+    )
+    samples = min(max(round(OF_JOINT / log.period), 5), position.shape[1] - 1)
+    samples -= 1 - samples % 2
+    smooth = local_parabola(position, samples, derivative=1, period=log.period)
+    velocity, speeds = between(position, log.period), _middle(smooth)
+    momentum, force = mechanism.along(_middle(position), velocity, speeds)
+    load = force + local_parabola(momentum, samples, derivative=1, period=log.period)
+    momentum -= mechanism.inertia[:, None] * velocity
+    return {
+        axis: Bodies(momentum[i], force[i], load[i], speeds, i)
+        for i, axis in enumerate(mechanism.axes)
+    }
+
+
+def _middle(signals: Array) -> Array:
+    """Means (..., n - 1) of each sample and the next."""
+    return np.asarray(0.5 * (signals[..., 1:] + signals[..., :-1]))

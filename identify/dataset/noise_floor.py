@@ -1,69 +1,98 @@
-"""The noise floor of a force residual, from the data alone.
+"""The noise floor of a fit with its parts and its uncertainty: one for all that is told of it.
 
-The residual before averaging, with a from second differences, is pure noise at high frequency:
-white noise of the measured force, S = A, and of the encoder, S = B (m (2 - 2 cos(w dt))/dt^2)^2.
-A and B are fitted to its spectrum above the band of the effects; the test functions pass a part of
-both. Where the encoder's noise hides that of the force in the whole band, the noise of the force is
-taken from the command: the part that the controller did not compute from its readings. The force of
-a machine is as noisy in each of its logs: one with far more power in the band has it from its
-motion, such as a load that strikes within its play.
+Between the changes of a reading the axis goes by a smooth path through them, so that much of what
+rounding to an encoder's steps did is told (`identify.dataset.readings`). That a reading changed is
+known to a sample only. This hides noise as white as the rounding of a fast motion, a twelfth of the
+squared step, but less by the part of the samples at which the reading changes.
+
+Over the position, rounding is a sawtooth. At a speed v its k-th harmonic, which has 6/(pi k)^2 of
+its power, is a tone of k v/step, folded at the sample rate: a motion of even speed has its rounding
+at no other frequency. By what a reading strays from an even motion, beyond its rounding, all that
+is told and every tone becomes white: the k-th harmonic keeps exp(-(2 pi k)^2 s^2) of its power,
+with s rms in steps (B. Widrow, I. Kollar, Quantization Noise, 2008, chapter 4).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from statistics import NormalDist
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identify.dataset.aliasing import folded
-from identify.dataset.drive import actual_force, is_noise
+from identify.dataset.drive import is_noise
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, at_rest, on_blocks, sticks, total_force
-from identify.dataset.rounding import rounding_variance, white_rounding
-from identify.dataset.spectrum import densities, pieces_of
+from identify.dataset.noise import Noise, noises_of
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.readings import rate_gain, white_rounding
+from identify.dataset.spectrum import median_spectrum
 from identify.dataset.test_function import TestFunction
-from identify.dataset.velocity import part_left, rate_gain
-from identify.dataset.whittle import fitted_levels
+from identify.rules import RULE
 from twin.model.machine import AxisModel
-from twin.signals import between
+from twin.signals import Array, between, local_parabola
 
-Array = NDArray[np.float64]
+SCATTER = 0.1  # of a part's RMS, by which its estimate misses it; see tests of the noise floor
+OF_ROUNDING = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
+SURE = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)  # standard errors to the floor's ends
+PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
+HARMONICS = 8  # that hold 93 % of the power; others are taken as white
+WIDEST = 501  # samples that tell a speed to a 10^-4 of a step a sample; more would take time
 
-SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
-LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
-MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
-BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
-BAND_OF_BOTH = 0.25  # its end beside a measured velocity, whose noise vanishes towards 0.5
-LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
-PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
+_PARTS: WeakKeyDictionary[PreparedLog, dict[tuple[bool, int], tuple[float, float]]]
+_PARTS = WeakKeyDictionary()
 
 
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """Measurement noise of one log, before it is averaged by test functions.
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What noise alone leaves in a force residual, N RMS by test functions.
 
-    frequency (k,): Hz. force: N^2/Hz, one-sided and white. most: the same, that the log leaves room
-    for where the reading's noise hides it. reading: m^2/Hz, one-sided and white. bend (k,): power
-    gain from a reading to the apparent force, N^2/m^2. segment: samples of the transform. folded:
-    N^2/Hz, one-sided, of the command that a thinned log folds; scatter: its relative error.
+    low, high: between which it is, with a probability of 95 %. parts: N RMS of each, whose squares
+    make up that of value: "sensors", white; "rounding" of the readings, where the axis has an
+    encoder with steps; "aliasing" of the command by a thinned log; "force", that no sensor makes.
     """
 
-    frequency: Array
-    force: float
-    most: float
-    reading: float
-    bend: Array
-    segment: int
-    folded: float = 0.0
-    scatter: float = 0.0
+    value: float
+    low: float
+    high: float
+    parts: Mapping[str, float]
 
     @property
-    def power(self) -> Array:
-        """Power of the noise in the force residual, (k,) N^2/Hz."""
-        return np.asarray(self.force + self.folded + self.reading * self.bend)
+    def follows_motion(self) -> bool:
+        """Whether most of its square is rounding and its aliases, whose size the motion sets."""
+        moved = sum(self.parts[name] ** 2 for name in ("rounding", "aliasing"))
+        return moved > 0.5 * self.value**2
+
+    def at_most(self, error: float) -> NoiseFloor:
+        """The same where an error, N RMS, leaves room for no more; its parts fall alike."""
+        if error >= self.value:
+            return self
+        fall = error / self.value
+        parts = {name: fall * size for name, size in self.parts.items()}
+        return replace(self, value=error, low=min(self.low, error), parts=parts)
+
+
+def noise_beside(
+    axis: AxisModel, logs: Sequence[PreparedLog], left: Sequence[Array] = ()
+) -> NoiseFloor:
+    """The noise floor of these logs, or less where what is left leaves no room for it.
+
+    left: of each log (n,) N, what the axis leaves, zero where it tells nothing. Noise leaves no
+    less than itself, so that the floor is at most its RMS. One that is below all that the floor may
+    be refutes the noise of the force: it was the controller's answer to readings that the log does
+    not hold, or a load that strikes within its play. Its level is then what the residual leaves
+    room for, and how large it could be is that of the logs.
+    """
+    noises = noises_of(axis, [log.motion for log in logs])
+    floor = _of_parts(axis, logs, noises)
+    told = np.concatenate([np.zeros(0), *(r[r != 0.0] for r in left)])
+    error = float(np.sqrt(np.mean(told**2))) if len(told) else np.inf
+    if error < floor.low:
+        rooms = [_within_room(*each) for each in zip(left, noises, logs, strict=True)]
+        less = _of_parts(axis, logs, rooms)
+        floor = replace(less, high=floor.high) if less.value < floor.value else floor
+    return floor.at_most(error)
 
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
@@ -72,25 +101,14 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     What the rounding of readings makes is a part of it where the axis has that effect; else it is
     what the model lacks.
     """
-    floor = unrounded_floor_of(axis, logs)
-    if not any(is_noise(f.effect) for f in axis.effects):
-        return floor
-    return float(np.hypot(floor, rounding_in(axis, logs)))
+    return noise_beside(axis, logs).value
 
 
-def unrounded_floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
-    """The floor (N RMS) that these logs would have, had their readings not been rounded."""
-    motions = [log.motion for log in logs]
-    noises = map(unrounded, noises_of(axis, motions), motions)
-    parts = [passed(n, log.motion, log.test_function) for n, log in zip(noises, logs, strict=True)]
-    own = np.sqrt(np.mean([log.force_noise**2 for log in logs]))  # which no sensor makes
-    return float(np.hypot(together(parts, motions), own))
-
-
-def unrounded(noise: Noise, motion: Motion) -> Noise:
-    """The noise less that of rounding at speed, which is as white as other noise of readings."""
-    white = white_rounding(motion.resolution, motion.sample_period)
-    return replace(noise, reading=max(noise.reading - white, 0.0))
+def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
+    """RMS in N of what white noise leaves in the force residual, that of rounding at speed too."""
+    motions = [motion for motion, _ in logs]
+    noises = noises_of(axis, motions)
+    return _together([n.passed(*log) for n, log in zip(noises, logs, strict=True)], motions)
 
 
 def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
@@ -98,128 +116,129 @@ def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     motions = [log.motion for log in logs]
     parts = []
     for noise, log in zip(noises_of(axis, motions), logs, strict=True):
-        own = unrounded(noise, log.motion).reading / (2.0 * log.motion.sample_period)
-        parts.append(rounding_variance(log, sticks(axis), noise.segment, own))
-    return axis.weighed.mass * together(parts, motions)
+        own = _unrounded(noise, log.motion).reading / (2.0 * log.motion.sample_period)
+        parts.append(_rounding_variance(log, sticks(axis), noise.segment, own))
+    return axis.weighed.mass * _together(parts, motions)
 
 
-def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
-    """RMS in N of what white noise leaves in the force residual, that of rounding at speed too."""
-    motions = [motion for motion, _ in logs]
-    noises = noises_of(axis, motions)
-    return together([passed(n, *log) for n, log in zip(noises, logs, strict=True)], motions)
+def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noise]) -> NoiseFloor:
+    """The floor of logs with these noises."""
+    motions = [log.motion for log in logs]
+
+    def size(each: Sequence[Noise]) -> float:
+        pairs = zip(each, logs, strict=True)
+        return _together([n.passed(w.motion, w.test_function) for n, w in pairs], motions)
+
+    sensors = [_unrounded(n, m) for n, m in zip(noises, motions, strict=True)]
+    rounds, told = rounding_in(axis, logs), any(is_noise(f.effect) for f in axis.effects)
+    parts = {
+        "sensors": size([replace(n, folded=0.0) for n in sensors]),
+        "rounding": rounds if told else 0.0,
+        "aliasing": size([replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]),
+        "force": float(np.sqrt(np.mean([log.force_noise**2 for log in logs]))),
+    }
+    errors = dict.fromkeys(parts, SCATTER) | {"rounding": OF_ROUNDING}
+    errors["aliasing"] += 0.5 * max(n.scatter for n in noises)
+    power = sum(size**2 for size in parts.values())
+    scatter = SURE * np.sqrt(sum((2.0 * errors[k] * v**2) ** 2 for k, v in parts.items()))
+    low = np.sqrt(max(power - scatter, 0.0))
+    high = np.sqrt(power + scatter + (0.0 if told else rounds**2))
+    return NoiseFloor(float(np.sqrt(power)), float(low), float(high), parts)
 
 
-def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
-    """The noise of each log; of its force what the quietest of the same rate leaves room for."""
-    return _noises_of(axis, tuple(motions))
+def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:
+    """The noise less what of it what is left (n,) N of a log has no room for; of white force.
+
+    In the octave below where test functions pass a quarter of the power: what a model lacks is
+    slower.
+    """
+    test = log.test_function
+    told = np.count_nonzero(left) / max(len(left), 1)
+    if told * len(left) < PIECE:
+        return noise
+    frequency, power = median_spectrum(left, PIECE, test.stride * test.period, left == 0.0)
+    response = test.response(log.motion.sample_period, noise.segment)
+    passed = np.interp(frequency, noise.frequency, response)
+    own = np.interp(frequency, noise.frequency, noise.reading * noise.bend)
+    room = np.maximum(power / (told * passed) - own, 0.0)
+    top = float(frequency[np.flatnonzero(passed < 0.25 * passed[0])[0]])
+    white = float(room[(frequency > 0.5 * top) & (frequency <= top)].mean())
+    if noise.folded == 0.0:
+        return replace(noise, force=white)
+    force = min(noise.force, white)
+    return replace(noise, force=force, folded=white - force)
 
 
-@lru_cache(maxsize=4)  # a fit, its evidence and its comparison ask for the same
-def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...]:
-    noises = [noise_of(axis, motion) for motion in motions]
-    quietest: dict[float, float] = {}
-    for noise, motion in zip(noises, motions, strict=True):
-        dt = motion.sample_period
-        quietest[dt] = min(noise.most, quietest.get(dt, np.inf))
-    least = [quietest[motion.sample_period] for motion in motions]
-    noises = [
-        replace(noise, force=low) if noise.force > LOUDER * low else noise
-        for noise, low in zip(noises, least, strict=True)
-    ]
-    thinned = np.mean([noise.folded > 0.0 for noise in noises]) >= 0.5  # logs of one recorder
-    return tuple(noises if thinned else [replace(noise, folded=0.0) for noise in noises])
+def _unrounded(noise: Noise, motion: Motion) -> Noise:
+    """The noise less that of rounding at speed, which is as white as other noise of readings."""
+    white = white_rounding(motion.resolution, motion.sample_period)
+    return replace(noise, reading=max(noise.reading - white, 0.0))
 
 
-def together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
+def _together(variances: Sequence[float], motions: Sequence[Motion]) -> float:
     seconds = [m.signals.shape[1] * m.period for m in motions]  # as many test functions has each
     return float(np.sqrt(np.average(variances, weights=seconds)))
 
 
-def passed(noise: Noise, motion: Motion, test_function: TestFunction) -> float:
-    """Variance, N^2, of the noise that a test function passes."""
-    response = test_function.response(motion.sample_period, noise.segment)
-    return float(np.trapezoid(noise.power * response, noise.frequency))
+def _rounding_variance(log: PreparedLog, sticks: bool, segment: int, own: float) -> float:
+    """Mean square, (m/s^2)^2, of what rounding adds to the accelerations of a log.
 
-
-def _band(motion: Motion, frequency: Array) -> NDArray[np.bool_]:
-    """Which frequencies (k,) Hz are above those of the effects."""
-    dt = motion.sample_period
-    top = BAND[2] if motion.velocity_weight == 0.0 else BAND_OF_BOTH
-    return np.asarray((frequency > min(BAND[0], BAND[1] / dt)) & (frequency < top / dt))
-
-
-def _bend(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
-    """Power gain (k,) from a position error m to the apparent force N."""
-    dt = motion.sample_period
-    gain = rate_gain(frequency, dt)
-    return np.asarray((gain * axis.mass) ** 2 * part_left(motion.velocity_weight, frequency, dt))
-
-
-def noise_of(axis: AxisModel, motion: Motion) -> Noise:
-    """The measurement noise of one log, from its raw residual."""
-    axis, dt = axis.weighed, motion.sample_period
-    velocity = motion.unrippled
-    # Noise in the command moves the axis as well; without the actuator's delay the two would not
-    # cancel and would look like measurement noise.
-    command = actual_force(axis, motion) + (motion.force - motion.raw[1])
-    raw = 0.5 * (command[1:] + command[:-1]) - between(motion.momentum(axis.mass, velocity), dt)
-    # The forces that the model explains, such as a bump passed at speed, are not noise either.
-    table = on_blocks(axis)
-    if table.labels:
-        raw += _between_samples(total_force(table, motion), motion)
-    # The median over segments ignores those with spikes and reversals.
-    segment = min(max(round(SEGMENT / dt), 256), len(raw))
-    frequency, power = median_spectrum(raw, segment, dt, _at_rest(axis, motion))
-    half = np.cos(np.pi * frequency * dt) ** 2
-    bend = _bend(axis, motion, frequency)
-    band = _band(motion, frequency)
-    force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
-    # Rounding is white in the mean alone: where it has less in the band, it has more below it.
-    plain = max(reading, white_rounding(motion.resolution, dt))
-    most = max(force, PLAIN * plain * float(bend[band][0]))
-    if force < most:
-        force = motion.command_noise
-    more, scatter = folded(motion, frequency[band], power[band], half[band], bend[band])
-    return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
-
-
-def _between_samples(force: Array, motion: Motion) -> Array:
-    """Means over blocks (n,) N as values at the log's inner samples."""
-    samples = np.arange(1, motion.raw.shape[1]) * motion.sample_period
-    return np.asarray(np.interp(samples, motion.time, force))
-
-
-def _at_rest(axis: AxisModel, motion: Motion) -> NDArray[np.bool_]:
-    """Where the axis may stick, (n,) over the log's inner samples.
-
-    Static friction then balances the command and its noise, whatever they are.
+    sticks: whether the axis has static friction, so that test functions at rest tell nothing.
+    segment: samples of the transform that tells what the test functions pass. own: variance, m^2,
+    of the readings' white noise before they were rounded.
     """
-    still = at_rest(motion.velocity)
-    samples = motion.raw.shape[1] // len(still)
-    return np.asarray(np.repeat(still & sticks(axis), samples)[1:])
+    if log.motion.resolution == 0.0:
+        return 0.0
+    known = _PARTS.setdefault(log, {})  # a property of the log alone, which every fit asks for
+    if (sticks, segment) not in known:
+        known[sticks, segment] = _parts(log, sticks, segment)
+    told, hidden = known[sticks, segment]
+    return max(_kept(1, own / log.motion.resolution**2) * told + hidden, 0.0)
 
 
-def median_spectrum(
-    signal: Array, segment: int, dt: float, left_out: NDArray[np.bool_]
-) -> tuple[Array, Array]:
-    """Welch's one-sided density with medians: frequency Hz, power unit^2/Hz, (segment // 2 + 1,).
+def _parts(log: PreparedLog, sticks: bool, segment: int) -> tuple[float, float]:
+    """Mean square of what readings without noise tell less what they then do not hide, and hidden.
 
-    At least a quarter of the segments is used, those with the fewest left-out samples, and of very
-    many as many as make the median sure.
-    Medians are biased, see B. Allen et al., Phys. Rev. D 85, 122006 (2012).
+    Both (m/s^2)^2; the second is what is hidden where noise lets the readings tell nothing.
     """
-    out = pieces_of(left_out, segment).mean(axis=1)
-    usable = np.flatnonzero(out <= np.quantile(out, LEAST_KEPT))
-    pieces = pieces_of(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
-    power = densities(_less_lines(pieces), dt)
-    odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
-    bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
-    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
+    motion = log.motion
+    dt, kept = motion.sample_period, moving([log], sticks)
+    frequency: Array = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
+    gain = rate_gain(frequency, dt) ** 2 * log.test_function.response(dt, segment)
+    white = motion.resolution**2 / 12.0 * 2.0 * dt * float(np.trapezoid(gain, frequency))
+    still = np.abs(motion.raw[0]) * dt < 0.5 * motion.resolution
+    told = log.fine.acceleration(between(motion.rounding, dt)) ** 2
+    told -= white * log.fine.mean(still.astype(float))
+    hidden = white + log.fine.mean(_tones(log, white, frequency, gain))
+    counted = kept if kept.any() else ~kept
+    return float(told[counted].mean()), float(hidden[counted].mean())
 
 
-def _less_lines(pieces: Array) -> Array:
-    """Pieces (k, n) less the straight line through each."""
-    ramp = np.linspace(-1.0, 1.0, pieces.shape[1])
-    slope = (pieces @ ramp) / (ramp @ ramp)
-    return np.asarray(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp))
+def _uneven(log: PreparedLog) -> tuple[Array, Array]:
+    """By what readings stray from an even motion, squared steps, and its steps a sample: (n,)."""
+    readings, step = log.motion.readings, log.motion.resolution
+    width = (min(len(log.fine.weights), WIDEST) - 1) | 1
+    path = local_parabola(readings, width)
+    square = np.convolve(((readings - path) / step) ** 2, np.ones(width) / width, "same")
+    return np.maximum(square[1:] - 1.0 / 12.0, 0.0), np.abs(np.diff(path)) / step
+
+
+def _kept(harmonic: int, strayed: Array | float) -> Any:
+    """Part of a harmonic's power that stays, where readings stray by so many squared steps."""
+    return np.exp(-((2.0 * np.pi * harmonic) ** 2) * strayed)
+
+
+def _tones(log: PreparedLog, white: float, frequency: Array, gain: Array) -> Array:
+    """Mean square (n,), (m/s^2)^2, that tones of even motion pass above what they would if white.
+
+    white: of all of rounding. frequency (k,): Hz. gain (k,): power gain from a reading to an
+    acceleration, 1/s^4.
+    """
+    strayed, steps = _uneven(log)
+    above = np.zeros(len(steps))
+    for k in range(1, HARMONICS + 1):
+        turns = k * steps
+        tone = np.interp(np.abs(turns - np.rint(turns)) / log.motion.sample_period, frequency, gain)
+        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * (turns > 0.5)  # slower ones are told
+        above += part * (log.motion.resolution**2 / 12.0 * tone - white)
+    return above

@@ -1,7 +1,11 @@
-"""Logs made ready for identification: a dataset for each axis that moves in them."""
+"""Logs made ready for identification: a dataset for each axis that moves in them.
+
+Logs that say nothing of a model are left out, and which and why is told.
+"""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -9,10 +13,8 @@ from itertools import islice
 
 import numpy as np
 
-from identify.dataset.beginning import beginnings
-from identify.dataset.bodies import bodies_along
+from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.excitation import excitation
 from identify.dataset.given_logs import (
     Given,
     moving_in,
@@ -21,17 +23,17 @@ from identify.dataset.given_logs import (
     require_one_kind,
     require_samples,
 )
-from identify.dataset.motion import Bodies, Motion
-from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.reading_ripple import ripples_of_widest
-from identify.dataset.recorded_motion import LONGEST_BLOCK, motion_of
+from identify.dataset.motion import LONGEST_BLOCK, Bodies, Motion, bodies_along, motion_of
+from identify.dataset.prepared_log import PreparedLog, moving
+from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
-from identify.dataset.time_scale import choose_length
+from identify.dataset.time_scale import beginnings, choose_length
 from twin.logs import Log
 from twin.memory import give_back
 from twin.model.machine import MachineModel
 from twin.parallel import spread
 
+LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
 LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
 
@@ -177,3 +179,36 @@ def _motions(
 
     made = iter(spread(motion, [given for some in parts for given in some.items()]))
     return tuple([*islice(made, len(some))] for some in parts)
+
+
+def telling(dataset: Dataset, sticks: bool) -> Dataset:
+    """The dataset less the logs without a test function that counts; each is told in one line.
+
+    sticks: whether the axis has static friction, whose force at rest the motion does not determine.
+    The training logs stay where none of them says anything: no fit can begin then, and that is its
+    error to tell.
+    """
+    silent = {
+        log.motion.name: _why(log, dataset.axis)
+        for role in Role
+        for log in dataset.having(role)
+        if not moving([log], sticks).any()
+    }
+    left_out = {**dataset.left_out, **silent}
+    for name, why in left_out.items():
+        LOGGER.warning("%s is left out: %s", name, why)
+    fit, holdout, test = (
+        tuple(log for log in dataset.having(role) if log.motion.name not in silent) for role in Role
+    )
+    return replace(dataset, fit=fit or dataset.fit, holdout=holdout, test=test, left_out=left_out)
+
+
+def _why(log: PreparedLog, axis: str) -> str:
+    """Why a log has no test function that counts, and what to give instead."""
+    if not log.reached.any():
+        return f"axis {axis} is nowhere where a training log has been; give one on the same travel"
+    return (
+        f"axis {axis} comes to rest within every test function of {log.test_function.length:g} s, "
+        "and at rest its friction is unknown; give a log in which it moves for longer at a time, "
+        "or a shorter --test-function (s)"
+    )

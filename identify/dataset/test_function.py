@@ -17,6 +17,7 @@ from twin.signals import Array, between
 
 OVERLAP = 4  # test functions that cover one instant
 LEAST_BLOCKS = 8  # that a test function spans
+LOOK = 0.1  # s, its length where none is chosen yet
 
 
 def require_test_function(length: float | None, longest: float) -> None:

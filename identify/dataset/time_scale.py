@@ -1,4 +1,4 @@
-"""How long test functions should be, from what the logs hold.
+"""How long test functions should be, from what the logs hold, and where a log begins to tell.
 
 Long ones are quiet, as they average noise away, and with it all that is fast: the cogging of a
 motor at speed, bumps passed in a hundredth of a second. The shortest that is quiet is taken, or a
@@ -11,17 +11,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import noise_floor
-from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS, LOOK, TestFunction
 from twin.model.machine import INERTIA, MASS, AxisModel
 from twin.signals import Array
 
 TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
 QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
-SHOWS = 2.0  # times the noise floor, from which a force that is not explained shows
-HIDES = 2.0  # times as large as at the quiet length, from which that length hides a force
+SHOWS = 2.0  # times the noise floor, and what a quiet length shows, from which a force shows
+LONGEST = 0.1  # of a log, that a beginning may last
+FOREIGN = 10.0  # times the RMS of what is left of the force later on
+HELD = 0.1  # of the force itself
 
 Motions = Sequence[Motion]
 
@@ -44,7 +47,7 @@ class Scale:
 
     def shows_more_than(self, quiet: Scale) -> bool:
         """Whether it holds a force, sure beside its noise, that a quieter scale hides."""
-        return self.left > SHOWS * self.floor and self.structure > HIDES * quiet.structure
+        return self.left > SHOWS * self.floor and self.structure > SHOWS * quiet.structure
 
     @classmethod
     def of(cls, length: float, motions: Motions) -> Scale:
@@ -97,7 +100,7 @@ def choose_test_function(motions: Motions, others: Motions = (), *, imposed: boo
     return max(TEST_FUNCTIONS[-1], LEAST_BLOCKS * longest_block)
 
 
-def inertia(motions: Motions, length: float = 0.1) -> float:
+def inertia(motions: Motions, length: float = LOOK) -> float:
     """Rough moved mass (kg): command regressed on acceleration, direction and speed."""
     columns, forces, _ = regressors(motions, length)
     gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
@@ -125,3 +128,43 @@ def regressors(motions: Motions, length: float) -> tuple[Array, Array, list[Test
         forces.append(w.mean(m.net))
         test_functions.append(w)
     return np.hstack(columns), np.concatenate(forces), test_functions
+
+
+def beginnings(motions: Motions) -> dict[str, float]:
+    """Logs with a beginning that the later motion does not explain, and its end in each, s.
+
+    An axis that hangs in its cogging or its stiction while the controller builds up force, or that
+    is still held by a brake, obeys no law of motion. One such moment may hold most of the squared
+    error of a log, and every parameter would serve it. The later motion of all logs tells a mass, a
+    friction and a constant.
+    """
+    columns, forces, test_functions = regressors(motions, LOOK)
+    times = [w.mean(m.time) for m, w in zip(motions, test_functions, strict=True)]
+    logs = np.repeat(np.arange(len(motions)), [len(t) for t in times])
+    ends = [LONGEST * float(m.time[-1]) for m in motions]
+    late = np.concatenate([t > end for t, end in zip(times, ends, strict=True)])
+    gains = np.linalg.lstsq(columns[:, late].T, forces[late], rcond=None)[0]
+    left = np.abs(forces - columns.T @ gains)
+    usual = float(np.sqrt(np.mean(left[late] ** 2)))
+    left[left < HELD * np.abs(forces)] = 0.0
+    found = [
+        _first_usual(left[logs == k], times[k], FOREIGN * usual, 2.0 * test_functions[k].length)
+        for k in range(len(motions))
+    ]
+    return {
+        m.name: begun
+        for m, begun, end in zip(motions, found, ends, strict=True)
+        if 2.0 * LOOK <= begun <= end
+    }
+
+
+def _first_usual(left: Array, time: Array, most: float, about: float) -> float:
+    """Time s from which the force left (n,) N is at most so large; 0 where it is from the start.
+
+    about: s, within which no force may be larger.
+    """
+    step = float(time[1] - time[0]) if len(time) > 1 else 1.0
+    width = max(round(about / step), 1)
+    padded = np.pad(left, (width // 2, (width - 1) // 2), mode="symmetric")
+    ordinary = np.flatnonzero(sliding_window_view(padded, width).max(axis=1) <= most)
+    return float(time[ordinary[0]]) if len(ordinary) and ordinary[0] else 0.0

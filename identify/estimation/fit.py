@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.drive import forces_lessened
-from identify.dataset.floor import NoiseFloor, noise_beside
+from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
-from identify.dataset.spectral_lines import lines_in_time
+from identify.dataset.spectrum import lines_in_time
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit_problem import FitProblem
 from identify.estimation.force_balance import jacobian, residual

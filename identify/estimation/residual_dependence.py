@@ -16,8 +16,7 @@ from identify.dataset.coordinates import OTHER, QUANTITIES, beside, gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
-from identify.dataset.spectral_lines import SpectralLine, find_lines
-from identify.dataset.spectrum import Record
+from identify.dataset.spectrum import Record, SpectralLine, find_lines
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
 from identify.rules import RULE

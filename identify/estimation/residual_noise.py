@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.spectral_lines import find_lines
-from identify.dataset.spectrum import Record
+from identify.dataset.spectrum import Record, find_lines
 from identify.estimation.evidence import blocks_of, by_blocks, effective_samples, rms
 from identify.estimation.fit import Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identify.dataset.spectral_lines import find_lines
-from identify.dataset.spectrum import FINEST_CYCLES, Record
+from identify.dataset.spectrum import Record, find_lines
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from twin.signals import Array
 
@@ -35,7 +34,7 @@ def spatial_periods(
         return ()
     thin = slice(None, None, -(-len(force) // MOST_SAMPLES))
     peaks = _peaks(position[thin], force[thin], weight[thin], columns[thin], span)
-    highest = min(0.25 * len(position), FINEST_CYCLES) / span
+    highest = 0.25 * len(position) / span
     found = find_lines(
         [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
         most=MOST_LINES, chance=EVERY,

@@ -13,7 +13,7 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.spectral_lines import lines_in_time
+from identify.dataset.spectrum import lines_in_time
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force, residual

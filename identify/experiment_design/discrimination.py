@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import parts_of
-from identify.dataset.motion import Motion
+from identify.dataset.motion import SHORTEST_LOG, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.recorded_motion import SHORTEST_LOG, motion_of
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import choose_test_function
 from identify.estimation.evidence import effective_samples, evidence, rms

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
-from identify.dataset.floor import noise_beside
-from identify.dataset.noise_floor import unrounded_floor_of
+from identify.dataset.noise_floor import noise_beside
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -167,9 +166,9 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
     left = error_on(fit.axis, logs)
-    error, less, noise = rms(left), unrounded_floor_of(fit.axis, logs), noise_beside(fit.axis, logs)
-    floor = noise.value
-    part = min((floor**2 - less**2) / error**2, 1.0)
+    error, noise = rms(left), noise_beside(fit.axis, logs)
+    floor, rounds = noise.value, noise.parts["rounding"]
+    part, less = min((rounds / error) ** 2, 1.0), float(np.sqrt(floor**2 - rounds**2))
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )

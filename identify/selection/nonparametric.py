@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset
-from identify.dataset.excitation import excitation
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.splines import Linearised, choose_stiffness
 from identify.estimation.variable_projection import fit_without

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.floor import noise_beside
+from identify.dataset.noise_floor import noise_beside
 from identify.dataset.prepared_log import (
     PreparedLog,
     moving,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.noise_floor import noise_of
+from identify.dataset.noise import noise_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
 from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY

@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
-from identify.dataset.noise_floor import Noise, noises_of
+from identify.dataset.noise import Noise, noises_of
 from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
 from identify.dataset.spectrum import densities, pieces_of
 from identify.estimation.fit import Fit

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.preparation import datasets
+from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
-from identify.dataset.silent_logs import telling
 from identify.estimation.channel_delay import aligned
 from identify.estimation.force_balance import effect_forces, residual
 from identify.validation.free_run import free_run

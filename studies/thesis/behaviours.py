@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from identify.analysis.velocity_map import VelocityMap
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from studies.thesis.study import Array, Numbers, followed, seed_of
 from twin.core.control import Controller
 from twin.experiments.kinds import Staircase

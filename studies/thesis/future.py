@@ -18,8 +18,8 @@ import numpy as np
 
 from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import Dataset
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.evidence import evidence, rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.force_balance import steady_friction

@@ -19,8 +19,8 @@ import numpy as np
 
 from identify.analysis.friction_curve import NAMES, fit_stribeck, stribeck_through
 from identify.analysis.velocity_map import VelocityMap
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import with_band

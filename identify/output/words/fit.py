@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.floor import NoiseFloor
+from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (

@@ -10,7 +10,7 @@ from built_fits import HARDWARE, axis_of, fitted
 from constructed import log_of
 
 from identify.analysis.following import closed_loop_errors, identified, twin_of
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.testing import assert_agree
 from twin.experiments.named import simulate
 from twin.model.machine import MachineModel

@@ -10,8 +10,8 @@ import pytest
 import identify
 from identify.analysis.friction_curve import StribeckCurve
 from identify.analysis.velocity_map import VelocityMap
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.dataset.recorded_motion import motion_of
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import Reversals, Staircase

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from constructed import effect, held, log_of, waves, windowed
 
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.fit import Fit, Outcome, fit_axis
 from identify.estimation.least_squares import minimise
 from twin.model.machine import AxisModel, Fitted

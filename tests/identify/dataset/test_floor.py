@@ -9,8 +9,8 @@ from machines import one_axis
 from benchmarks.second_simulator.kernel import READING
 from benchmarks.second_simulator.machine import PLACE, drawn, run
 from identify import workflow
-from identify.dataset.floor import noise_beside
-from identify.dataset.whittle import levels_with_dip
+from identify.dataset.noise_floor import noise_beside
+from identify.dataset.spectrum import fitted_levels
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 from twin.model.machine import Fitted
@@ -86,7 +86,8 @@ def test_the_coherence_of_a_dip_is_found_and_independent_noises_have_none():
     for coherence in (0.0, 0.7, 0.9):
         both = 0.7 * white + 0.02 * bend
         both -= 2.0 * coherence * np.sqrt(0.7 * white * 0.02 * bend)
-        level, found = levels_with_dip(white, bend, both * chance)
-        assert found == pytest.approx(coherence, abs=0.15)
+        shapes = np.stack([white, bend, -np.sqrt(white * bend)], axis=1)
+        level, reading, dip = fitted_levels(shapes, both * chance)
+        assert 0.5 * dip / np.sqrt(level * reading) == pytest.approx(coherence, abs=0.15)
         if coherence:
             assert level == pytest.approx(0.7, rel=0.3)

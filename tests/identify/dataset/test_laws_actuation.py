@@ -21,7 +21,7 @@ from identify.dataset.drive import (
     reading_error,
     true_motion,
 )
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import averaged_force
 from twin.model.machine import AxisModel
 

@@ -8,14 +8,13 @@ import pytest
 from constructed import SHORT, ridden
 from scipy.signal import lfilter
 
-from identify.dataset.excitation import _rest, lines, ripples
-from identify.dataset.spectral_lines import (
+from identify.dataset.coordinates import _rest, lines, ripples
+from identify.dataset.spectrum import (
     MOST_LINES,
-    _refined,
+    Record,
     find_lines,
     lines_in_time,
 )
-from identify.dataset.spectrum import Record
 
 N = 6000
 
@@ -117,13 +116,3 @@ def test_a_ripple_of_the_reading_is_found_at_its_period():
     assert ripples([loud])[0] == pytest.approx(pitch, rel=3e-3)
     still = replace(SHORT, signals=SHORT.signals * [[0.0], [1.0], [1.0]])
     assert ripples([still]) == ()
-
-
-@pytest.mark.parametrize("off", [-0.12, -0.05, 0.04, 0.13])
-def test_a_lines_frequency_is_refined_from_either_side(off):
-    t = np.sort(np.random.default_rng(4).uniform(0.0, 10.0, 3000))
-    true, step = 7.3, 0.1
-    record = Record(t, np.sin(2.0 * np.pi * true * t))
-    frequency, share = _refined([record], true + off * step, step)
-    assert frequency == pytest.approx(true, abs=0.01 * step)
-    assert share == pytest.approx(1.0, abs=0.01)

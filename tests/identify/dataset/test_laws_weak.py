@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from constructed import SHORT, log_of, moved, waves
 
-from identify.dataset.excitation import excitation
-from identify.dataset.motion import SMOOTHED, Motion
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.coordinates import excitation
+from identify.dataset.motion import SMOOTHED, Motion, motion_of
 from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
 from twin.errors import InputError
 from twin.signals import white_noise

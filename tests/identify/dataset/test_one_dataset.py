@@ -13,8 +13,8 @@ from machines import one_axis
 
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log
+from identify.dataset.given_logs import share_samples
 from identify.dataset.preparation import datasets
-from identify.dataset.shared_samples import share_samples
 from identify.estimation.channel_delay import aligned
 from identify.output.as_json import json_of
 from identify.output.text import fit_text

@@ -56,14 +56,14 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     assert position[~held.reached].min() > 0.03
     assert 0.2 < part < 0.6
     (told,) = [text for text in prepared_in_words(beyond) if "selection log" in text]
-    assert told.startswith(f"held 0: a selection log, but {100 * part:.0f} % of it lies at pos")
+    assert told.startswith(f"held 0: {100 * part:.0f} % of this selection log is left out: it lies")
 
 
 def test_a_test_log_is_not_called_held_out() -> None:
     beyond = dataset_of(0.02)
     tested = replace(beyond, holdout=(), test=beyond.holdout)
     (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
-    assert told.startswith("held 0: a test log, but ")
+    assert "of this test log is left out" in told
 
 
 def test_a_channel_delay_keeps_it() -> None:

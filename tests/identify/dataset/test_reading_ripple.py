@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identify.dataset.reading_ripple import ripple, ripple_periods, ripples_of_widest
-from identify.dataset.resolution import resolution_of
+from identify.dataset.readings import resolution_of, ripple, ripple_periods, ripples_of_widest
 from twin.signals import white_noise
 
 DT = 1e-4  # s

@@ -9,7 +9,7 @@ from machines import one_axis
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
-from identify.dataset.noise_floor import noise_of
+from identify.dataset.noise import noise_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import fit_axis

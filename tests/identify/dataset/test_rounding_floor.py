@@ -9,11 +9,11 @@ from machines import one_axis
 from planted_logs import RATE, SLIDE, Ride, logged
 
 from identify import workflow
-from identify.dataset.floor import noise_beside
-from identify.dataset.noise_floor import floor_of, noise_of, rounding_in
+from identify.dataset.motion import motion_of
+from identify.dataset.noise import noise_of
+from identify.dataset.noise_floor import floor_of, noise_beside, rounding_in
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.recorded_motion import motion_of
-from identify.dataset.rounding import white_rounding
+from identify.dataset.readings import white_rounding
 from identify.estimation.force_balance import residual
 from twin.experiments.named import simulate
 from twin.model.file import load_model

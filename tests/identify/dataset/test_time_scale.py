@@ -7,11 +7,10 @@ import pytest
 from constructed import CATALOGUE, log_of
 
 from identify.analysis.first_model import first_model
-from identify.dataset.beginning import FOREIGN, HELD, beginnings
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import LEAST_BLOCKS
-from identify.dataset.time_scale import HIDES, QUIET, SHOWS, Scale
+from identify.dataset.time_scale import FOREIGN, HELD, QUIET, SHOWS, Scale, beginnings
 from identify.output.words.fit import prepared_in_words
 from identify.workflow import compare, fit
 from twin.errors import InputError
@@ -59,7 +58,7 @@ def test_a_shorter_length_must_show_a_force_beside_its_noise(left, floor, shows)
 @pytest.mark.parametrize(("part", "shows"), [(0.99, True), (1.01, False)])
 def test_and_the_quiet_one_must_hide_it(part, shows):
     short = Scale(0.02, 5.0, 1.0)
-    seen = part * short.structure / HIDES
+    seen = part * short.structure / SHOWS
     assert short.shows_more_than(Scale(0.2, float(np.hypot(seen, 0.3)), 0.3)) is shows
     assert QUIET < 1.0 / SHOWS  # what is quiet needs no shorter one
 

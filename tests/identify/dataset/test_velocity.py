@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from constructed import log_of, waves
 
-from identify.dataset.noise_floor import noise_of
-from identify.dataset.recorded_motion import motion_of
-from identify.dataset.velocity import together
+from identify.dataset.motion import motion_of
+from identify.dataset.noise import noise_of
+from identify.dataset.readings import together
 from twin.model.machine import AxisModel
 from twin.signals import between
 
@@ -32,10 +32,10 @@ def measured(seed: int, late: float = 0.0, gain: float = 1.0):
 @pytest.mark.parametrize("late", [0.0, 2e-3, 4.3e-3])
 def test_the_position_that_both_tell_is_nearer_to_the_truth(late):
     x, v = measured(1, late)
-    told = together(x, v, RATE**-1)
+    position, weight = together(x, v, RATE**-1)
     # Densities: 2 READ^2/RATE of the readings, 2 TOLD^2/RATE of the velocity.
-    assert told.weight == pytest.approx((READ * RATE / TOLD) ** 2, rel=0.5)
-    error = told.position - PLACE(T)
+    assert weight == pytest.approx((READ * RATE / TOLD) ** 2, rel=0.5)
+    error = position - PLACE(T)
     assert np.std(error) < 0.5 * READ
     # The rate at one sample is that of the velocity, not of the differenced readings.
     assert np.std(between(error, 1.0 / RATE)) < 1.5 * TOLD
@@ -44,14 +44,13 @@ def test_the_position_that_both_tell_is_nearer_to_the_truth(late):
 
 def test_a_velocity_that_cannot_be_trusted_is_not_used():
     x, v = measured(2, gain=1.05)
-    assert together(x, v, 1.0 / RATE).weight == 0.0
+    assert together(x, v, 1.0 / RATE)[1] == 0.0
     x, v = measured(2, late=0.02)
-    assert together(x, v, 1.0 / RATE).weight == 0.0
+    assert together(x, v, 1.0 / RATE)[1] == 0.0
     x, _ = measured(3)
     copied = np.gradient(x, 1.0 / RATE)  # made of the readings: it holds nothing new
-    np.testing.assert_array_equal(together(x, copied, 1.0 / RATE).position, x)
-    assert together(x, None, 1.0 / RATE).position is x
-    assert together(x[:500], measured(3)[1][:500], 1.0 / RATE).weight == 0.0
+    np.testing.assert_array_equal(together(x, copied, 1.0 / RATE)[0], x)
+    assert together(x, None, 1.0 / RATE)[0] is x
 
 
 def test_the_noise_floor_knows_of_the_velocity():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from constructed import dataset_of, effect, fit_of, log_of, waves, windowed
 
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.channel_delay import fit_aligned, misalignment, moved_by, realigned
 from identify.estimation.fit import fit_axis
 from identify.output.words.fit import channel_delay_in_words

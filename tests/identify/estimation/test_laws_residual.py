@@ -19,6 +19,7 @@ from constructed import (
     windowed,
 )
 
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import (
     REST_SPEED,
     PreparedLog,
@@ -26,7 +27,6 @@ from identify.dataset.prepared_log import (
     scale_of,
     sticks,
 )
-from identify.dataset.recorded_motion import motion_of
 from identify.dataset.test_function import TestFunction
 from identify.estimation.force_balance import (
     averaged_force,

@@ -15,9 +15,9 @@ import pytest
 from constructed import CATALOGUE, Array, log_of, waves
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import total_force
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.fit import Fit, at_bounds, fit_axis
 from identify.estimation.scaling import limits_of
 from identify.estimation.variable_projection import starts

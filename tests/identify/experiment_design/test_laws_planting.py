@@ -14,8 +14,8 @@ from constructed import (
 )
 
 from identify.dataset.drive import reading_error
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT, states_along

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from built_fits import CATALOGUE, axis_of, built, built_fit, fitted
 
-from identify.dataset.floor import NoiseFloor
+from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.planting import FORCE, MASS, exemplary_motion, signature

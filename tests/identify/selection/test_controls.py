@@ -17,8 +17,8 @@ from constructed import log_of
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, split_by_log, sticks
-from identify.dataset.recorded_motion import motion_of
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import unabsorbed

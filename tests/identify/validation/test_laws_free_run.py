@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from constructed import effect, held, log_of, waves, windowed
 
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT
 from identify.validation.comparison import side_by_side

@@ -6,7 +6,7 @@ from constructed import log_of, windowed
 from machines import one_axis
 from scipy.signal import lfilter
 
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import residual
 from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
 from identify.workflow import fit

@@ -10,7 +10,7 @@ from built_fits import CATALOGUE, HARDWARE, axis_of, fitted
 
 from identify.analysis.friction_curve import StribeckCurve
 from identify.analysis.velocity_map import VelocityMap
-from identify.dataset.recorded_motion import motion_of
+from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import force_along
 from studies.thesis import (
     behaviours,
