@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.noise_floor import NoiseFloor
-from identify.dataset.noise_floor import floor_of
+from identify.dataset.noise_floor import NoiseFloor, floor_of
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
 from identify.estimation.fit import Errors, Fit, error_in
 from identify.estimation.intervals import Estimate, estimates
