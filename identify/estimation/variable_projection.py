@@ -259,8 +259,12 @@ BETTER = 0.99  # part of the error that a new start must reach to be taken
 def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = None) -> Fit:
     """Fit an axis; scan its effects' shapes again where the error is above the noise floor.
 
-    begun: what the fit counts as begun with; the axis itself where None.
+    Long logs by their beginnings, with one fit of what is found to all of them. begun: what the fit
+    counts as begun with; the axis itself where None.
     """
+    if dataset.part is not dataset:
+        found = fit_axis(fit_multistart(axis, dataset.part).axis, dataset.fit)
+        return replace(found, begun=begun or axis)
     best = fit_axis(axis, dataset.fit)
     if begun is not None:
         best = replace(best, begun=begun)
