@@ -24,7 +24,6 @@ from identify.selection.confidence import Level
 from identify.selection.findings import FindingKind
 
 LEAST_ANSWERS = 30  # to a level: a rate of them is known to some 10 points
-MOST_LEVELS = 5
 SPLIT = 1  # seed of the halves
 
 
@@ -62,7 +61,7 @@ def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
     (answers + 2), Laplace's rule, so that none is certain. The last has no end.
     """
     ordered = sorted(answers, key=lambda a: -a.part)
-    count = min(max(len(ordered) // LEAST_ANSWERS, 1), MOST_LEVELS)
+    count = max(len(ordered) // LEAST_ANSWERS, 1)
     pooled: list[list[Answer]] = []
     for part in np.array_split(np.arange(len(ordered)), count):
         pooled.append([ordered[i] for i in part])
