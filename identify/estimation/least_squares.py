@@ -112,16 +112,15 @@ def _secant(columns: Array, step: Array, change: Array) -> Array:
 def _step(
     columns: Array, force: Array, damping: float, x: Array, bounds: tuple[Array, Array]
 ) -> Array:
-    gradient = columns.T @ force
+    gradient, normal = columns.T @ force, columns.T @ columns
+    size = np.sqrt(np.diag(normal))
     held = ((x <= bounds[0]) & (gradient > 0)) | ((x >= bounds[1]) & (gradient < 0))
-    free = ~held & (np.einsum("ij,ij->j", columns, columns) > 0)
+    free = ~held & (size > 0)
     step = np.zeros(len(gradient))
-    if not free.any():
-        return step
-    own = columns[:, free]
-    scale = np.sqrt(np.einsum("ij,ij->j", own, own))
-    normal = (own.T @ own) / np.outer(scale, scale) + damping * np.eye(len(scale))
-    step[free] = -np.linalg.solve(normal, gradient[free] / scale) / scale
+    if free.any():
+        scale = size[free]
+        unit = normal[np.ix_(free, free)] / np.outer(scale, scale) + damping * np.eye(len(scale))
+        step[free] = -np.linalg.solve(unit, gradient[free] / scale) / scale
     return step
 
 

@@ -112,6 +112,7 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     part = dataset.part
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
+    base.forget()  # of all of the logs; it is asked for them when the search has ended
     found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
     _forget(found)
