@@ -24,7 +24,7 @@ from identify.dataset.prepared_log import (
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.walks import averaged_columns, reading_columns
-from twin.effect import RUBBING, Kind
+from twin.effect import RUBBING, Effect, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
@@ -61,14 +61,27 @@ def effect_forces(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Arr
     return {name: whole - averaged_force(axis.without(name), logs) for name in axis.names}
 
 
-def _is_stepped_finely(axis: AxisModel) -> bool:
-    """Whether an actuation with memory asks for the log's own rate."""
-    return any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+def _is_apart(axis: AxisModel) -> bool:
+    """Whether actuation is walked by itself.
+
+    One with memory asks for the log's own rate; a friction with load is walked under that.
+    """
+    memory = any(f.effect.kind is Kind.ACTUATION and f.effect.states for f in axis.effects)
+    return memory or bool(_borne(axis))
+
+
+def _borne(axis: AxisModel) -> list[str]:
+    """Names of the effects by which friction depends on the load."""
+    return [f.effect.name for f in axis.effects if _bears(f.effect)]
+
+
+def _bears(effect: Effect) -> bool:
+    return effect.kind in RUBBING and effect.reads("U")
 
 
 def _table_between(axis: AxisModel) -> Table:
     """Table of the effects that act along the motion and force of ``_driven``."""
-    apart = {Kind.SENSING, *((Kind.ACTUATION,) if _is_stepped_finely(axis) else ())}
+    apart = {Kind.SENSING, *((Kind.ACTUATION,) if _is_apart(axis) else ())}
     return axis_table({"": parts_of(axis, *(set(Kind) - apart))})
 
 
@@ -77,12 +90,28 @@ def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
     motion, error_rate = true_motion(axis, log.motion)
     added: Array | float = 0.0
     driven = motion
-    if _is_stepped_finely(axis):
+    if _is_apart(axis):
         driven = motion.with_force(actual_force(axis, motion))
         added = log.fine.mean(driven.raw[1] - motion.raw[1])
+    if _borne(axis):
+        driven = replace(driven, signals=np.stack([*driven.signals[:2], _load(axis, log)]))
     if motion is not log.motion:
         added = added + axis.mass * log.fine.acceleration(error_rate)
     return driven, added
+
+
+def _load(axis: AxisModel, log: PreparedLog) -> Array:
+    """Force (n,) N that the motion asks of the motor by the model, less what depends on it.
+
+    In each block, from the means by test functions. Not the measured command: of that friction in
+    its proportion takes noise as well, and "explains" it.
+    """
+    loaded = _borne(axis)
+    acting = [f for f in axis.effects if f.effect.kind is not Kind.ACTUATION]
+    rest = replace(axis, effects=tuple(f for f in acting if f.effect.name not in loaded))
+    bodies = log.fine.mean(log.motion.raw[1]) - log.command
+    asked = axis.mass * log.acceleration - averaged_force(rest, [log]) + bodies
+    return np.interp(log.motion.time, log.time, asked)
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -122,16 +151,14 @@ def _names(dataset: Dataset) -> str:
 def group_of(axis: AxisModel, effect: str) -> AxisModel:
     """The part of the axis whose force can change when a parameter of that effect does.
 
-    Friction and its modifiers form one group, the actuation effects another; the two are one group
-    where a friction depends on the motor's force. Any other effect is a group by itself. Sensing
-    effects belong to every group, because they change the motion that all others act along.
+    Friction and its modifiers form one group, the actuation effects another. Any other effect is a
+    group by itself. Sensing effects belong to every group, because they change the motion that all
+    others act along.
     """
     kind = axis[effect].effect.kind
     if kind is Kind.SENSING:
         return axis
-    friction, chain = RUBBING, (Kind.ACTUATION,)
-    joined = any(f.effect.kind in friction and f.effect.reads("U") for f in axis.effects)
-    for joint in ((*friction, *chain),) if joined else (friction, chain):
+    for joint in (RUBBING, (Kind.ACTUATION,)):
         if kind in joint:
             return parts_of(axis, *joint, Kind.SENSING)
     return replace(axis, effects=(axis[effect], *parts_of(axis, Kind.SENSING).effects))
@@ -173,6 +200,12 @@ def changes(
 
 def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -> Iterator[_Walk]:
     """For each walk along a log the parameters that it is for, and the change that they make."""
+    if _borne(axis) and where:  # every parameter adds to the load
+        values = read(axis, where)
+        each = zip(where, values, steps, strict=True)
+        moved = [write(axis, [c], [value + step]) for c, value, step in each]
+        yield [*range(len(where))], partial(_with_load, moved, axis)
+        return
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
@@ -193,6 +226,12 @@ def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -
                 for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
             yield bent, _difference(group, moved, effect)
+
+
+def _with_load(moved: Sequence[AxisModel], unmoved: AxisModel, log: PreparedLog) -> Array:
+    """Change (m, n) N of the residual by walks of their own."""
+    base = residual(unmoved, [log])
+    return np.stack([residual(axis, [log]) - base for axis in moved])
 
 
 def _by_strengths(
@@ -218,7 +257,7 @@ def _difference(group: AxisModel, moved: Sequence[AxisModel], effect: str) -> _A
     absent = len(group.effects) == 1 and bool(strengths) and not any(strengths)
     if kind is Kind.SENSING and absent:
         return partial(_apparent_forces, moved, effect)
-    if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_stepped_finely(group)):
+    if kind is Kind.SENSING or (kind is Kind.ACTUATION and _is_apart(group)):
         return partial(_one_by_one, moved, None if absent else group)
     # The motion and the force behind it stay; all sets of values go along it in one walk.
     table = _table_between(group)
