@@ -162,6 +162,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
     while len(steps) < RULE.most_steps:
         taken = [s.change.name for s in steps]
         step = within(progress, f"step {len(steps) + 1} of at most {RULE.most_steps}")
+        judged = judged if steps else _without_delay(judged, catalogue, step)
         judged, last, candidates = tried_beside(judged, catalogue, step, taken)
         if not steps:
             first, ranking = judged, ordered(candidates)
@@ -181,6 +182,21 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         judged = _settled(Judged(fit, dataset))
     found = Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
     return found if first.dataset is judged.dataset else _told_on(judged, found)
+
+
+def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> Judged:
+    """The fit without a channel delay, where an effect of the catalogue leaves less than the delay.
+
+    A friction that lags behind reversals looks like one while the model has it follow at once.
+    """
+    delay, fit = judged.dataset.channel_delay, judged.fit
+    if delay == 0.0 or judged.at_floor:
+        return judged
+    dataset = realigned(judged.dataset, 0.0)
+    plain = Judged(replace(fit_axis(fit.axis, dataset.fit), begun=fit.begun), dataset)
+    tried = tried_beside(plain, catalogue, within(progress, "no channel delay"))[1]
+    found = [t for t in tried if t.candidate.supported and not t.judged.dataset.channel_delay]
+    return plain if any(score(judged, t.judged).accepted for t in found) else judged
 
 
 def _with_free_exponents(
