@@ -12,7 +12,7 @@ from benchmarks.timing import interleaved
 from identify import workflow
 from identify.estimation.variable_projection import absent_effects
 from identify.selection.acceptance import Judged
-from identify.selection.search import tried_beside
+from identify.selection.trying import tried_beside
 from twin.core.native import law_address
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate

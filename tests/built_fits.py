@@ -19,7 +19,8 @@ from identify.estimation.scaling import Scaling
 from identify.selection.acceptance import Judged, Score, Taken
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Look
-from identify.selection.search import Step, Tried
+from identify.selection.search import Step
+from identify.selection.trying import Tried
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, Hardware, axis_table

@@ -263,8 +263,8 @@ def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = 
     counts as begun with; the axis itself where None.
     """
     if dataset.part is not dataset:
-        found = fit_axis(fit_multistart(axis, dataset.part).axis, dataset.fit)
-        return replace(found, begun=begun or axis)
+        shaped = fit_multistart(axis, dataset.part).axis
+        return replace(fit_axis(shaped, dataset.fit), begun=begun or axis)
     best = fit_axis(axis, dataset.fit)
     if begun is not None:
         best = replace(best, begun=begun)

@@ -13,13 +13,9 @@ from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
-from identify.selection.findings import (
-    Finding,
-    FindingKind,
-    findings_of,
-    without_law,
-)
-from identify.selection.search import Found, Step, Tried, is_level, search
+from identify.selection.findings import Finding, FindingKind, findings_of, without_law
+from identify.selection.search import Found, Step, is_level, search
+from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.model.machine import Fitted

@@ -14,7 +14,8 @@ from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.confidence import confidence
 from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.free_exponent import FreeExponent, exponent_curve
-from identify.selection.search import Found, Step, parameters
+from identify.selection.search import Found, Step
+from identify.selection.trying import parameters
 from twin.model.machine import AxisModel
 
 

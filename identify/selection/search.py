@@ -10,56 +10,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise
-from identify.estimation.channel_delay import moved_by, realigned
+from identify.estimation.channel_delay import realigned
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, finished, fit_axis
+from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.least_squares import unabsorbed
-from identify.estimation.scaling import Scaling
 from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
-from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
+from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, score
-from identify.selection.candidates import Candidate, candidate_of, noise_candidate, ordered
-from identify.selection.changes import (
-    Added,
-    Change,
-    Freed,
-    Look,
-    Reshaped,
-    control,
-    freed_of,
-    from_all_starts,
-    reshaped_of,
-)
+from identify.selection.candidates import Candidate, candidate_of, ordered
+from identify.selection.changes import Added, Change, Look, Reshaped, control, freed_of
 from identify.selection.controls import Trial
-from twin.effect import Effect, Kind
+from identify.selection.trying import (
+    LEADERS,
+    Tried,
+    judged_change,
+    refitted_on,
+    settled,
+    tried_beside,
+)
+from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.memory import give_back
-from twin.model.machine import AxisModel
-from twin.parallel import spread
 from twin.progress import Progress, silent, within
 
-LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
-NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
 OUTSIDE = 0.1  # of the square of a law's force, below which a free curve can make it as well
-SETTLED = 0.999  # of the error, below which another refit is a better optimum
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """A change beside a fit, refitted: the fit with it, and what speaks for it."""
-
-    change: Change
-    look: Look
-    judged: Judged
-    candidate: Candidate
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +159,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
             break
         fit = fit_multistart(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
-        judged = _settled(Judged(fit, dataset))
+        judged = settled(Judged(fit, dataset))
     found = Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
     return found if first.dataset is judged.dataset else _told_on(judged, found)
 
@@ -217,25 +197,6 @@ def _with_free_exponents(
     return judged, out
 
 
-def _settled(judged: Judged) -> Judged:
-    """The fit with the channel delay that it finds, where that is another than the dataset has.
-
-    An effect that the model lacked may have looked like a delay, or hidden one. So a change brings
-    its own delay, and is judged with it.
-    """
-    moved = moved_by(judged.fit, judged.dataset)
-    if moved is None:
-        return judged
-    fit = replace(fit_axis(judged.fit.axis, moved.fit), begun=judged.fit.begun)
-    return Judged(fit, moved) if fit.error < judged.fit.error else judged
-
-
-def _refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
-    """An axis fitted to the dataset of a judged fit."""
-    dataset = judged.dataset
-    return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
-
-
 def _told_on(final: Judged, found: Found) -> Found:
     """What was found, told on the dataset of the final fit, whose channel delay is another.
 
@@ -246,7 +207,7 @@ def _told_on(final: Judged, found: Found) -> Found:
 
     def there(fit: Fit) -> Judged:
         one = Judged(fit, dataset)
-        return one if fit.logs is dataset.fit else _refitted_on(fit.axis, one, final)
+        return one if fit.logs is dataset.fit else refitted_on(fit.axis, one, final)
 
     first = there(found.base.fit)
 
@@ -267,45 +228,6 @@ def _told_on(final: Judged, found: Found) -> Found:
     return replace(found, base=first, ranking=tuple(ranking.values()), steps=steps, passed=passed)
 
 
-def tried_beside(
-    judged: Judged,
-    catalogue: Catalogue,
-    progress: Progress = silent,
-    taken: Sequence[str] = (),
-) -> tuple[Judged, list[Tried], list[Candidate]]:
-    """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
-
-    taken: names of laws that the search added; a free curve may stand in the place of one, or of
-    one that the model had from the beginning, which is then not absent.
-
-    If the values of the best without its change are a better start for the fit, it is refitted from
-    there: a fit short of its optimum would let every change in.
-    """
-    known = {*taken, *judged.fit.begun.names}
-    effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
-    plain = [Added(e) for e in effects if not is_noise(e)]
-    changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
-    if judged.at_floor:
-        changes = []
-    trial = Trial.beside(judged)
-    trying = partial(progress, "trying changes")
-    looks = spread(lambda c: c.look(judged, trial), changes, trying)
-    tried = _refitted(judged, looks, len({e.kind for e in effects}), progress)
-    enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
-    if not enough:
-        progress("trying free curves", 0, 1)
-        curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
-        best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, len(curves), progress, tried)
-    judged, tried = _at_its_best(judged, tried)
-    give_back()
-    noise = [as_noise(judged, e) for e in effects if is_noise(e)]
-    ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
-    looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
-    candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
-    return judged, [*tried, *noise], candidates
-
-
 def is_level(one: Tried, best: Tried) -> bool:
     """Whether the logs do not tell two changes apart, or by too little to matter."""
     effects = [t.change.effect for t in (one, best) if isinstance(t.change, Added)]
@@ -313,102 +235,6 @@ def is_level(one: Tried, best: Tried) -> bool:
         return True  # which of the two is late, no log of both can tell
     by = score(one.judged, best.judged)
     return by.t < least_t(1) or by.part < RULE.least_part
-
-
-def _refitted(
-    judged: Judged,
-    looks: Sequence[Look],
-    among: int,
-    progress: Progress,
-    known: Sequence[Tried] = (),
-) -> list[Tried]:
-    """The changes that promise enough, refitted; the better ones from all starts if none is enough.
-
-    among: of how many independent ones they are; effects of one kind are alike. known: what was
-    refitted before.
-    """
-    asked = RULE.promise * RULE.least_part
-    waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
-    refitting = partial(progress, "refitting the promising")
-    first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS], refitting)
-    most = max((_roughly(judged, f) for _, f in first), default=0.0)
-    most = max([most, *(t.candidate.part for t in known)])
-    rest = [k for k in waiting[LEADERS:] if k.promise >= RULE.promise * most]
-    fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest, refitting)]
-    if not any(f.at_floor for _, f in fits):
-        fits.sort(key=lambda pair: -_roughly(judged, pair[1]))
-        anew = partial(progress, "refitting the best from other starts")
-        fits[:LEADERS] = spread(lambda p: (p[0], from_all_starts(judged, *p)), fits[:LEADERS], anew)
-    judging = partial(progress, "judging the refitted")
-    return spread(lambda pair: judged_change(judged, *pair, among), fits, judging)
-
-
-def _fit_of(judged: Judged, look: Look) -> Fit:
-    return look.change.refit(judged, look)
-
-
-def _roughly(judged: Judged, fit: Fit) -> float:
-    """Part of the error above the floor that a fit takes of the training logs."""
-    above = max(judged.fit.error**2 - judged.fit.floor**2, 1e-300)
-    return (judged.fit.error**2 - fit.error**2) / above
-
-
-def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried:
-    """A refitted change with its score; its controls are asked only where they could decide.
-
-    among: of how many changes it is chosen.
-    """
-    change, after = look.change, Judged(fit, judged.dataset)
-    if not fit.at_floor:
-        after = _settled(after)
-    found = candidate_of(judged, after, change.effect, parameters(change), among)
-    if found.supported and found.score:
-        taken = control(change, judged, after)
-        found = replace(found, score=replace(found.score, control=taken))
-    return Tried(change, look, after, found)
-
-
-def parameters(change: Change) -> tuple[str, ...]:
-    """Names of the parameters by which a change is told to be plausible."""
-    if isinstance(change, Added):
-        return tuple(p.name for p in change.effect.parameters)
-    return (change.parameter,) if isinstance(change, Freed) else ()
-
-
-def _as_looked(judged: Judged, look: Look) -> Candidate:
-    """An absent effect that was not refitted, as its linear step predicts it."""
-    axis = look.axes[0]
-    fit = replace(judged.fit, axis=axis, scaling=Scaling.of(axis, judged.fit.logs))
-    return Candidate.looked(judged, fit, look.change.effect, look.promise)
-
-
-def as_noise(judged: Judged, effect: Effect) -> Tried:
-    """An effect that only raises the noise floor."""
-    fit, dataset = judged.fit, judged.dataset
-    axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
-    after = Judged(finished(axis, fit.begun, dataset.fit, fit.outcome), dataset)
-    change = Added(effect)
-    return Tried(change, Look(change, 0.0), after, noise_candidate(judged, after, effect))
-
-
-def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried]]:
-    """The fit refitted from where the best change left it, and the changes scored against it."""
-    proved = [t for t in tried if t.candidate.supported]
-    if not proved:
-        return judged, tried
-    best = max(proved, key=lambda t: t.candidate.part)
-    axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
-    if axis is None or best.candidate.part > NEARLY_ALL:
-        return judged, tried
-    refitted = _refitted_on(axis, judged, judged)
-    if refitted.fit.error > SETTLED * judged.fit.error:
-        return judged, tried
-    return refitted, [_scored_again(refitted, t) for t in tried]
-
-
-def _scored_again(judged: Judged, tried: Tried) -> Tried:
-    among = tried.candidate.score.among if tried.candidate.score else 1
-    return judged_change(judged, tried.look, tried.judged.fit, among)
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
@@ -472,7 +298,7 @@ def _together(
         axis = way.change.undone(both.fit.axis, judged.fit.axis)
         if axis is None or score(judged, both).refused:
             continue
-        alone = _refitted_on(axis, both, both)
+        alone = refitted_on(axis, both, both)
         if _is_needed(way.change, alone, both):
             return [Step(way, with_others=True), replace(second, with_others=True)]
     return []
@@ -502,7 +328,7 @@ def _less_replaced(
     for step in gone:
         axis = step.change.undone(axis, first.fit.axis) or axis
     if axis is not judged.fit.axis:
-        judged = _refitted_on(axis, judged, judged)
+        judged = refitted_on(axis, judged, judged)
     *kept, last = (s for s in steps if s not in gone)
     dropped = (*last.dropped, *dict.fromkeys(s.change.name for s in gone))
     return judged, (*kept, replace(last, dropped=dropped))
@@ -524,7 +350,7 @@ def _needed(
             continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
-            without = _refitted_on(axis, judged, judged)
+            without = refitted_on(axis, judged, judged)
             if isinstance(steps[-1].change, Reshaped) and _is_held(step.change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
