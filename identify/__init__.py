@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Addition", "Agreement", "Comparison", "Diagnosis", "Feedforward", "FitResult",
     "SimulationFit", "add", "add_shape", "agree", "along_track", "cable_force", "compare",
-    "diagnose", "dynamic_friction", "feedforward", "fit", "fit_simulation", "friction_map", "plan",
-    "velocity_map",
+    "diagnose", "dynamic_friction", "feedforward", "first_model", "fit", "fit_simulation",
+    "friction_map", "plan", "velocity_map",
 ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from identify.analysis.cable_force import cable_force as cable_force
 from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
+from identify.analysis.first_model import first_model as shown_by
 from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
@@ -59,6 +60,17 @@ from twin.progress import Progress, silent, within
 Logs = Mapping[str, Log]
 Model = MachineModel | str | Path
 READING = "reading and preparing the logs"
+
+
+def first_model(
+    logs: GivenLogs, name: str = "machine", catalogue: Catalogue | None = None
+) -> MachineModel:
+    """A model to begin with, of what the logs show: mass, friction, constant force, hardware.
+
+    Raises InputError where no axis moves, and where the logs do not tell the mass.
+    """
+    known = load_catalogue() if catalogue is None else catalogue
+    return shown_by(logs_by_name(logs, Role.TRAINING.value), name, known)
 
 
 @parallel()

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from identify.output.numbers import NOTHING, number, pretty, spaced
-from identify.output.report.page import Column, Row, Table
+from identify.output.report.page import Row, Table
 from studies.drawing import INK, Picture, new_figure, plain_tick
 
 HEIGHT = 2.2  # inches of a row of panels
@@ -36,9 +36,8 @@ def tables(found: Any, name: str) -> Iterator[Table]:
 def table(rows: Mapping[Any, Mapping[str, Any]], caption: str) -> Table:
     """Entries by row and column; a column without any entry is left out."""
     known = {k: None for row in rows.values() for k, v in row.items() if v is not None}
-    columns = [Column(spaced(k), numeric="unit" not in k) for k in known]
     cells = [Row([spaced(str(k)), *(_cell(row.get(c)) for c in known)]) for k, row in rows.items()]
-    return Table([Column(""), *columns], cells, caption[:1].upper() + caption[1:])
+    return Table(["", *map(spaced, known)], cells, caption[:1].upper() + caption[1:])
 
 
 def _cell(value: Any) -> str:

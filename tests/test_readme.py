@@ -136,6 +136,20 @@ def test_the_answers_are_those_of_the_commands(tmp_path):
     assert without_figures(outputs["answered"](TEXT, tmp_path)) == without_figures(TEXT)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "named"), [("emps", "asymmetric_friction"), ("laas", "cogging")])
+def test_the_pages_of_public_measurements_are_true(name, named, shared_data, tmp_path):
+    """Who has the published files gets by the page alone, as printed, to the effect in newtons."""
+    require_installed()
+    for file in (shared_data / name).iterdir():
+        (tmp_path / file.name).symlink_to(file)
+    text = (ROOT / "docs" / "start" / f"{name}.md").read_text(encoding="utf-8")
+    outputs = runpy.run_path(str(ROOT / "docs" / "outputs.py"), run_name="outputs")
+    found = outputs["answered"](text, tmp_path)
+    assert re.search(rf"Missing: {named}\b.*\n  \w+ error on the training logs [\d.]+ ->", found)
+    assert without_figures(found) == without_figures(text)
+
+
 def without_figures(text: str) -> str:
     return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
 

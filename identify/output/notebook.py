@@ -43,7 +43,10 @@ def parameters(result: FitResult, said: Mapping[str, Iterable[str]]) -> str:
     blocks: list[Block] = []
     for axis, fit in result.fits.items():
         lines = [capitalised(line.strip()) for line in said[axis]]
-        blocks += [Listing(lines), fit_table(fit.axis, result.estimates[axis])]
+        blocks += [
+            Listing(lines),
+            fit_table(fit.axis, {"Value": result.estimates[axis]}, fit.floor),
+        ]
     return fragment(blocks)
 
 

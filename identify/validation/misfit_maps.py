@@ -59,7 +59,7 @@ class MisfitMap:
 class Region:
     """A bin of a coordinate with a large error: RMS, ratio to noise floor, share of squared error.
 
-    rms: in ``force_unit``.
+    rms: in ``force_unit``. visited: share of time; of a frequency band that of the squared force.
     """
 
     coordinate: str
@@ -70,6 +70,7 @@ class Region:
     ratio: float
     share: float
     force_unit: str = LINEAR.force
+    visited: float = 0.0
 
 
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:
@@ -239,10 +240,11 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
         chance = np.sqrt(chdtri(values, CHANCE / max(tried, 1)) / values)
         excess[~(m.rms > chance * m.floor)] = 0.0
         i = int(np.argmax(excess))
-        low, high, error, floor, share = (
-            float(values[i]) for values in (m.low, m.high, m.rms, m.floor, m.share)
+        low, high, error, floor, share, visited = (
+            float(values[i]) for values in (m.low, m.high, m.rms, m.floor, m.share, m.visited)
         )
-        region = Region(m.coordinate, m.unit, low, high, error, error / floor, share, m.force_unit)
+        ratio = error / floor
+        region = Region(m.coordinate, m.unit, low, high, error, ratio, share, m.force_unit, visited)
         if excess[i] >= LEAST_SHARE:
             found.append((float(excess[i]), region))
     found.sort(key=lambda pair: -pair[0])

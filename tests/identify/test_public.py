@@ -58,6 +58,12 @@ def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, fil
     )
 
 
+def test_a_first_model_is_that_of_the_logs(log) -> None:
+    model = identify.first_model(log)
+    assert list(model.axes) == list(log.axes)
+    assert identify.fit(model, log).model.axes["x"].mass > 0.0
+
+
 def test_logs_of_two_roles_need_no_names(log) -> None:
     other = twin.simulate(twin.load_model("proton_xy"), "tracking", seed=2, duration=2.0)
     found = identify.fit(twin.load_model("proton_xy"), log, other)

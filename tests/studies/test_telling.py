@@ -47,7 +47,7 @@ FOUND = {
 
 def test_alike_entries_are_a_table_each() -> None:
     parameters, spikes, white = tables(plain(FOUND), "cable")
-    assert [c.title for c in parameters.columns] == ["", "true", "mean", "unit"]
+    assert [*parameters.titles] == ["", "true", "mean", "unit"]
     assert [tuple(row.cells) for row in parameters.rows] == [
         ("sigma0", "260", "260", "N/m"), ("sigma1", "0.600", "-0.0612", "N·s/m"),
     ]  # fmt: skip

@@ -14,7 +14,7 @@ from identify.output.report.explorer import explored
 from identify.output.report.page import Answer, Block, Heading, Part, Section
 from identify.output.report.page import page as whole_page
 from identify.output.report.subject import Subject
-from identify.output.words.commands import Source
+from identify.output.words.commands import UNKNOWN, Source
 from identify.results.addition import Addition
 from identify.results.results import Comparison, Diagnosis
 from twin.files import require_writable, write_atomically
@@ -45,7 +45,7 @@ def write_report(
     history: Sequence[HistoryStep],
     additions: Sequence[Addition] = (),
     assumed: Sequence[str] = (),
-    source: Source | None = None,
+    source: Source = UNKNOWN,
     faults: Sequence[str] = (),
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
@@ -57,12 +57,10 @@ def write_report(
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    subject = Subject(
-        title, diagnosis, comparison, tuple(history), tuple(additions), tuple(assumed),
-        source or Source(), tuple(faults),
-    )  # fmt: skip
+    subject = Subject(title, diagnosis, comparison, history, additions, source)
+    warnings = [("Not confirmed", line) for line in assumed] + [("Fault", line) for line in faults]
     text = whole_page(
-        subject.title, facts(subject), sections(subject), explored(subject), origin(subject)
+        title, facts(subject), sections(subject), explored(subject), origin(subject), warnings
     )
     write_atomically(path, text.encode("utf-8"))
 
@@ -88,9 +86,7 @@ def facts(subject: Subject) -> list[tuple[str, str]]:
     """The line under the title: model, logs by role, test functions."""
     axes = subject.comparison.axes.values()
     lengths = dict.fromkeys(quantity(a.logs[0].test_function.length, "s") for a in axes)
-    shown = [("Not confirmed", line) for line in subject.assumed]
-    shown += [("Fault", line) for line in subject.faults]
-    shown.append(("Model", subject.comparison.model.name))
+    shown = [("Model", subject.comparison.model.name)]
     for role, logs in subject.logs.items():
         compared = role is Role.TRAINING and subject.diagnosis is None
         title = "Logs" if compared else f"{role.value.capitalize()} logs"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Role
@@ -20,7 +20,6 @@ from identify.output.numbers import (
 from identify.output.report.page import (
     Block,
     Chart,
-    Column,
     Drawn,
     Facts,
     Heading,
@@ -34,7 +33,7 @@ from identify.output.report.page import (
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.addition import errors_of_step
 from identify.output.words.diagnosis import tested_on, why_not
-from identify.output.words.findings import advice, shape_in_words
+from identify.output.words.findings import shape_in_words
 from identify.output.words.fit import (
     common_reason,
     estimate_in_words,
@@ -42,7 +41,6 @@ from identify.output.words.fit import (
     nonparametric_in_words,
 )
 from identify.results.addition import Addition
-from identify.results.results import AxisSummary
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import nonparametric_labels
@@ -77,16 +75,15 @@ def found(view: AxisView) -> list[Block]:
         every = (scale.text(tested.before), scale.text(tested.after))
         rows.append(Row(("All together", *every, percent(view.found.explained), *[NOTHING] * 3)))
     titles = (
-        "Error without it", "Error with all", "Share of squared error",
+        "Effect", "Error without it", "Error with all", "Share of squared error",
         "Of the logs that decided", "Shifted in time, at most", "Such answers right",
     )  # fmt: skip
-    columns = (Column("Effect"), *(Column(title, numeric=True) for title in titles))
     caption = (
         f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
         "others refitted, which can stand in for it: the shares need not add up. The same force "
         "shifted in time cannot be real. Right: of answers in the self-test."
     )
-    return [Table(columns, rows, view.words(caption))]
+    return [Table(titles, rows, view.words(caption))]
 
 
 # --- the shape of a law, and curves without physics ------------------------------------------
@@ -99,8 +96,7 @@ def law_shapes(view: AxisView) -> list[Block]:
         if finding.shape is not None:
             caption = (
                 f"{shape_in_words(finding.effect, finding.shape)} Where the band holds the dashed "
-                "line, these logs do not tell the two apart. "
-                f"{capitalised(advice([finding]))}"
+                "line, these logs do not tell the two apart."
             )
             blocks.append(Heading(f"{spaced(finding.effect)} on {view.name}".capitalize()))
             blocks += [*shape_charts(finding.shape), Listing([caption])]
@@ -136,43 +132,41 @@ WITH_VALUES = 3  # candidates whose parameter values are printed
 
 def ranking(view: AxisView) -> list[Block]:
     """A table of all absent effects that were refitted, best first, and the others' names."""
-    if view.found is None or not view.found.ranking:
-        return []
-    others = [spaced(c.effect.name) for c in view.found.ranking if not c.score]
-    said = f"Not refitted, as one linear step of them takes too little: {', '.join(others)}."
-    table = ranking_table(view.found)
-    return [*([table] if table.rows else []), *([Listing([said])] if others else [])]
+    every = view.found.ranking if view.found else ()
+    others = ", ".join(spaced(c.effect.name) for c in every if not c.score)
+    said = f"Not refitted, as one linear step of them takes too little: {others}."
+    table = [_ranked(view.found)] if view.found and any(c.score for c in every) else []
+    return [*table, *([Listing([said])] if others else [])]
 
 
-def ranking_table(found: AxisDiagnosis) -> Table:
+def _ranked(found: AxisDiagnosis) -> Table:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
     scale = Scale.of(units.force, [e for c in found.ranking for e in (c.gain.before, c.gain.after)])
     rows = []
     for rank, c in enumerate(c for c in found.ranking if c.score):
         tone = Tone.PLAIN if c.supported else Tone.MUTED
+        part = max(c.part, 0.0)
         cells = (
             title_case(c.effect.name),
             number(c.delta_bic),
             scale.text(c.gain.before),
             scale.text(c.gain.after),
-            percent(max(c.part, 0.0)),
+            percent(part),
             spaced(why_not(found, c)),
             values_of(c.effect, c.fit.axis) if rank < WITH_VALUES else "",
         )
-        shown = Tone.STRONG if c is found.best else tone
-        rows.append(Row(cells, shown, min(max(c.part, 0.0), 1.0)))
-    titles = ("Evidence (ΔBIC)", "Error before", "Error after", "Part removed")
-    columns = (
-        Column("Effect"), *(Column(title, numeric=True) for title in titles), Column("Why not"),
-        Column("Values"),
+        rows.append(Row(cells, Tone.STRONG if c is found.best else tone, min(part, 1.0)))
+    titles = (
+        "Effect", "Evidence (ΔBIC)", "Error before", "Error after", "Part removed", "Why not",
+        "Values",
     )  # fmt: skip
     caption = (
         f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
         f"BIC. Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the "
         "noise floor, on the training logs or on data left out of the fit, whichever is less."
     )
-    return Table(columns, rows, units.words(caption))
+    return Table(titles, rows, units.words(caption))
 
 
 def values_of(effect: Effect, model: AxisModel) -> str:
@@ -200,10 +194,6 @@ def growth(subject: Subject) -> list[Block]:
     return blocks
 
 
-def _step_name(step: HistoryStep, added: str) -> str:
-    return added if step.action == "add" else f"{step.action} {spaced(step.effect)}"
-
-
 def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Table:
     """The errors before and after each step, and the noise floors of the logs of this page."""
     roles = (Role.TRAINING, Role.SELECTION, Role.TEST)
@@ -213,18 +203,18 @@ def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> 
     for s in steps:
         pairs = [errors_of_step(s).get(role, (None, None)) for role in shown]
         cells = (scale.text(error) for pair in pairs for error in pair)
-        rows.append(Row((_step_name(s, title_case(s.effect)), *cells)))
+        name = title_case(s.effect) if s.action == "add" else f"{s.action} {spaced(s.effect)}"
+        rows.append(Row((name, *cells)))
     if floors:
         cells = (text for role in shown for text in ("", scale.text(floors.get(role))))
         rows.append(Row(("Noise floor of these logs", *cells), Tone.MUTED))
-    titles = (f"{role.value.capitalize()}, {w}" for role in shown for w in ("before", "after"))
-    columns = (Column("Effect added"), *(Column(title, numeric=True) for title in titles))
+    when = (f"{role.value.capitalize()}, {w}" for role in shown for w in ("before", "after"))
     caption = (
         "RMS force error on the logs of each role when the effect was added and everything "
         "refitted. A real effect lowers the error on the selection logs as much as that on the "
         "training logs."
     )
-    return Table(columns, rows, units_of(steps[0].unit).words(caption))
+    return Table(["Effect added", *when], rows, units_of(steps[0].unit).words(caption))
 
 
 def _positions(additions: Sequence[Addition]) -> Table:
@@ -235,13 +225,11 @@ def _positions(additions: Sequence[Addition]) -> Table:
         errors = (*(a.position_error or (None, None)), a.replayed)
         name = f"{title_case(a.step.effect)} on {a.step.axis}"
         rows.append(Row((name, *map(scale.text, errors), "kept" if a.kept else "not supported")))
-    titles = ("Free run, before", "Free run, after", "Replayed by MuJoCo")
-    columns = (
-        Column("Effect added"), *(Column(title, numeric=True) for title in titles),
-        Column("Outcome"),
+    titles = (
+        "Effect added", "Free run, before", "Free run, after", "Replayed by MuJoCo", "Outcome",
     )  # fmt: skip
     what = " and ".join(dict.fromkeys(a.units.words("position") for a in additions))
-    return Table(columns, rows, f"RMS {what} error of the model driven by the logged command.")
+    return Table(titles, rows, f"RMS {what} error of the model driven by the logged command.")
 
 
 # --- the laws that are named -----------------------------------------------------------------
@@ -282,9 +270,13 @@ def _law(effect: Effect, model: AxisModel, axis: str) -> list[Block]:
 
 def parameters(view: AxisView) -> list[Block]:
     """A table: with intervals where the model was fitted here."""
-    if view.found and view.summary:
-        return [_fitted(view.found, view.summary, view.label)]
-    return [given_table(view.model)]
+    if not (view.found and view.summary):
+        return [given_table(view.model)]
+    found, summary = view.found, view.summary
+    sides = {f"Without {view.label}": summary.before, f"With {view.label}": summary.after}
+    new = {c.label for c in found.final.scaling.where} - {c.label for c in found.base.scaling.where}
+    known = sides if view.label else {"Value": summary.before}
+    return [fit_table(found.final.axis, known, summary.floor, new)]
 
 
 def given_table(axis: AxisModel) -> Table:
@@ -297,56 +289,38 @@ def given_table(axis: AxisModel) -> Table:
     }
     hidden = nonparametric_labels(axis)
     rows = [Row((k, value, meanings[k])) for k, value in values.items() if k not in hidden]
-    columns = (Column("Parameter"), Column("Value", numeric=True), Column("Meaning"))
-    return Table(columns, rows, "Values of the given model; twin fit adds intervals.")
+    caption = "Values of the given model; twin fit adds intervals."
+    return Table(("Parameter", "Value", "Meaning"), rows, caption)
 
 
-def fit_table(axis: AxisModel, known: Sequence[Estimate]) -> Table:
-    """Values of a fit with their intervals."""
+def fit_table(
+    axis: AxisModel,
+    sides: Mapping[str, Sequence[Estimate]],
+    floor: float,
+    new: Collection[str] = (),
+) -> Table:
+    """Values of fits by their headings, with intervals. new: labels that stand out.
+
+    floor: the one noise floor that is told, N.
+    """
     meanings, hidden = _meanings(axis), nonparametric_labels(axis)
-    common = common_reason(known)
-    rows = [
-        Row((e.label, *estimate_in_words(e, common), meanings.get(e.label, "")))
-        for e in known
-        if e.label not in hidden
-    ]
-    columns = (
-        Column("Parameter"), Column("Value", numeric=True), Column("90 % interval"),
-        Column("Meaning"),
-    )  # fmt: skip
-    return Table(columns, rows)
-
-
-def _fitted(found: AxisDiagnosis, summary: AxisSummary, label: str) -> Table:
-    """Values of the fitted model, beside those of the model with what was found."""
-    sides = {f"Without {label}": summary.before, f"With {label}": summary.after}
-    if not label:
-        sides = {"Value": summary.before}
-    labels = list(dict.fromkeys(e.label for e in (*summary.after, *summary.before)))
-    meanings = _meanings(found.final.axis)
-    columns, remarks, cells = [Column("Parameter")], [], {name: [name] for name in labels}
+    labels = dict.fromkeys(e.label for known in reversed([*sides.values()]) for e in known)
+    titles, remarks, cells = ["Parameter"], [], {n: [n] for n in labels if n not in hidden}
     for heading, known in sides.items():
-        columns.append(Column(heading, numeric=True))
         # Where all values have the same reason, it is in the caption instead of a column.
-        if common := common_reason(known):
-            if isinstance(common, ModelWrong):  # over the one noise floor of this page
-                common = replace(common, floor=summary.floor)
-            remarks.append(f"{heading}: {no_interval_in_words(common)}.")
-        else:
-            columns.append(Column("90 % interval"))
-        by_label = {e.label: e for e in known}
-        for name in labels:
-            cells[name] += _cells(by_label.get(name))[: 1 if common else 2]
-    new = {c.label for c in found.final.scaling.where} - {c.label for c in found.base.scaling.where}
+        common, by_label = common_reason(known), {e.label: e for e in known}
+        titles += [heading] if common else [heading, "90 % interval"]
+        if common:
+            told = replace(common, floor=floor) if isinstance(common, ModelWrong) else common
+            remarks.append(f"{heading}: {no_interval_in_words(told)}.")
+        for name, row in cells.items():
+            both = estimate_in_words(by_label[name]) if name in by_label else (NOTHING, "")
+            row += both[: 1 if common else 2]
     rows = [
         Row((*row, meanings.get(name, "")), Tone.STRONG if name in new else Tone.PLAIN)
         for name, row in cells.items()
     ]
-    return Table([*columns, Column("Meaning")], rows, " ".join(remarks))
-
-
-def _cells(estimate: Estimate | None) -> tuple[str, str]:
-    return (NOTHING, "") if estimate is None else estimate_in_words(estimate)
+    return Table([*titles, "Meaning"], rows, " ".join(remarks))
 
 
 def _meanings(axis: AxisModel) -> dict[str, str]:

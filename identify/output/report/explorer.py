@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.output.numbers import Scale, spaced, title_case
+from identify.output.numbers import Scale, quantity, spaced, title_case, typeset
 from identify.output.report.subject import AxisView, Subject
 from identify.results.signals import Signals
 from twin.curve import Coordinate
@@ -75,7 +75,7 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
             "force": words("Force"),
             "model_before": f"model without {view.label}" if view.label else "model",
             "model_after": f"model with {view.label}",
-            "dots": "single test functions",
+            "floor": typeset(quantity(view.axis.floor, view.units.force)),
         },
     }  # fmt: skip
 

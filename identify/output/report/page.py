@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -12,12 +13,13 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from identify.output.numbers import typeset
+from identify.output.numbers import NOTHING, typeset
 
 if TYPE_CHECKING:
     from identify.output.report.subject import AxisView, Subject
 
 Array = NDArray[np.float64]
+NUMBER = re.compile(rf"(-?([\d.]+(e[+-]\d+)?|∞)( \S+)?|{NOTHING})?")  # a cell, with its unit
 CHART_DIGITS = 5  # significant, of a number that is drawn
 
 
@@ -105,14 +107,6 @@ def printed(values: Array) -> list[float | None]:
 
 
 @dataclass(frozen=True)
-class Column:
-    """Heading of a table column; numbers are aligned to the right."""
-
-    title: str
-    numeric: bool = False
-
-
-@dataclass(frozen=True)
 class Row:
     """Cells of a table row. bar: 0..1, drawn behind the first."""
 
@@ -123,12 +117,18 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table, with a sentence below it (may be empty)."""
+    """A table, with a sentence below it (may be empty); titles: of the columns."""
 
     macro: ClassVar[str] = "table"
-    columns: Sequence[Column]
+    titles: Sequence[str]
     rows: Sequence[Row]
     caption: str = ""
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Which columns hold numbers alone, and so are aligned to the right; not the first."""
+        columns = [*zip(*(row.cells for row in self.rows), strict=True)][1:]
+        return [False, *(all(map(NUMBER.fullmatch, column)) for column in columns)]
 
 
 @dataclass(frozen=True)
@@ -195,11 +195,12 @@ def page(
     shown: Sequence[Section],
     signals: Sequence[Mapping[str, Any]] = (),
     origin: Sequence[tuple[str, str]] = (),
+    warnings: Sequence[tuple[str, str]] = (),
 ) -> str:
     """The page as HTML text; every text is escaped by the template.
 
     facts: under the title. signals: of each axis, to be explored beside the first section. origin:
-    in the footer, what the page was made of.
+    in the footer, what the page was made of. warnings: before the answer.
     """
     return (
         _templates()
@@ -207,6 +208,7 @@ def page(
         .render(
             title=title,
             facts=facts,
+            warnings=warnings,
             sections=shown,
             signals=signals,
             drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),

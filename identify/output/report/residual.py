@@ -7,32 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.estimation.residual_dependence import Dependence
-from identify.output.numbers import (
-    Scale,
-    capitalised,
-    inverse,
-    number,
-    percent,
-    quantity,
-    spaced,
-)
-from identify.output.report.page import (
-    Block,
-    Chart,
-    Column,
-    Drawn,
-    Ink,
-    Line,
-    Listing,
-    Row,
-    Table,
-)
+from identify.output.numbers import Scale, capitalised, inverse, number, percent, quantity, spaced
+from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.residual import correlation_in_words, loop_in_words, place_in_words
 from identify.rules import RULE
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON
-from identify.validation.misfit_maps import MisfitMap, Region
+from identify.validation.misfit_maps import MisfitMap
 from identify.validation.whiteness import Correlation, ResidualTests
 from twin.model.units import AxisUnits, units_of
 
@@ -55,31 +37,24 @@ def regions_table(axis: AxisComparison) -> Table:
     """The regions whose share of the error most exceeds their share of time, in that order."""
     rows = []
     for region in axis.worst:
-        time = _visited(axis.maps, region)
         cells = (
             capitalised(place_in_words(region)).removesuffix("."),
             quantity(region.rms, region.force_unit),
             number(region.ratio),
             percent(region.share),
-            percent(time),
-            percent(region.share - time),
+            percent(region.visited),
+            percent(region.share - region.visited),
         )
         rows.append(Row(cells, bar=region.share))
     titles = (
-        "RMS error", "Times noise floor", "Share of squared error", "Share of time", "Difference",
+        "Where", "RMS error", "Times noise floor", "Share of squared error", "Share of time",
+        "Difference",
     )  # fmt: skip
-    columns = (Column("Where"), *(Column(title, numeric=True) for title in titles))
     caption = (
         "The worst region of each coordinate, by the last column. Of a frequency band the share of "
         "time is that of the squared force."
     )
-    return Table(columns, rows, axis.units.words(caption))
-
-
-def _visited(maps: Sequence[MisfitMap], region: Region) -> float:
-    of = (m for m in maps if m.coordinate == region.coordinate)
-    found = (m.visited[m.low == region.low] for m in of)
-    return float(next((part[0] for part in found if len(part)), 0.0))
+    return Table(titles, rows, axis.units.words(caption))
 
 
 def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap]) -> Table:
@@ -89,9 +64,10 @@ def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap]) -> Table
     rows = [
         Row((units_of(units.get(name)).words(spaced(name)), percent(share)), bar=share)
         for name, share in ordered
+        if share >= 0.005  # the least that is not printed as 0 %
     ]
     caption = "Part of what is left that a curve over each coordinate alone accounts for."
-    return Table((Column("Coordinate"), Column("Share", numeric=True)), rows, caption)
+    return Table(("Coordinate", "Share"), rows, caption)
 
 
 def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
@@ -189,10 +165,9 @@ def logs(view: AxisView) -> list[Block]:
         for name, error in axis.force_error.items()
     ]  # fmt: skip
     titles = (
-        "Duration", words("Force error, RMS"), "Times noise floor",
+        "Log", "Duration", words("Force error, RMS"), "Times noise floor",
         words("Position error, free run, RMS"), "Expected from noise",
     )  # fmt: skip
-    columns = (Column("Log"), *(Column(title, numeric=True) for title in titles))
     model = f"Of the model without {view.label}. " if view.label else ""
     caption = (
         f"{model}Noise floor of the force: {quantity(axis.floor, view.units.force)} RMS with test "
@@ -200,4 +175,4 @@ def logs(view: AxisView) -> list[Block]:
         f"from the measured motion every {HORIZON:g} s; between restarts the position drifts with "
         "every wrong force, measurement noise included."
     )
-    return [Table(columns, rows, words(caption))]
+    return [Table(titles, rows, words(caption))]

@@ -13,6 +13,7 @@ from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
 from identify.results.results import AxisSummary, Comparison, Diagnosis
 from identify.results.signals import Signals, signals_of
+from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
 from twin.model.machine import AxisModel, HistoryStep
@@ -28,9 +29,7 @@ class Subject:
     comparison: Comparison
     history: Sequence[HistoryStep]
     additions: Sequence[Addition]
-    assumed: Sequence[str] = ()
     source: Source = UNKNOWN
-    faults: Sequence[str] = ()
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:
@@ -48,22 +47,19 @@ class Subject:
 
     @cached_property
     def views(self) -> list[AxisView]:
-        """The axes in the order of the model, but the leading axis of the diagnosis first."""
-        leading = self.diagnosis.leading if self.diagnosis else None
-        missing = leading and leading.verdict is not Verdict.NOTHING_MISSING
-        first = leading.dataset.axis if leading and missing else None
-        ordered = sorted(self.comparison.axes.values(), key=lambda a: a.axis != first)
-        return [AxisView(self, axis) for axis in ordered]
+        """The axes in the order of the model, but first the one that the answer is about."""
+        axes = self.comparison.axes.values()
+        first = max(axes, key=lambda a: a.ratio >= RULE.at_floor and a.ratio).axis
+        if self.diagnosis:
+            leading = self.diagnosis.leading
+            quiet = leading.verdict is Verdict.NOTHING_MISSING
+            first = "" if quiet else leading.dataset.axis
+        return [AxisView(self, axis) for axis in sorted(axes, key=lambda a: a.axis != first)]
 
     @property
     def steps(self) -> Sequence[HistoryStep]:
         """The added effects, from the model's history or else from the additions."""
         return self.history or tuple(a.step for a in self.additions)
-
-    @property
-    def forces(self) -> str:
-        """What the axes are moved by: force, torque, or both."""
-        return " and ".join(dict.fromkeys(view.words("force") for view in self.views))
 
     def floors(self, axis: str) -> Mapping[Role, float]:
         """The noise floors of one axis by role of logs, N RMS; none where it does not move."""

@@ -60,6 +60,8 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     found, region = result.axes[axis], result.left_over.get(axis)
     words = found.base.axis.units.words
     left = left_in_words(found, result.summaries[axis].floor)
+    if found.verdict is Verdict.NOTHING_MISSING:
+        left += _beyond_in_words(result.summaries[axis], words("force error"))
     if found.unexplained:
         left.append(dependence_in_words(found.unexplained))
         left += [words(worst_in_words(region))] if region else []
@@ -247,7 +249,6 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
     """Channel delays, fits that did not converge, changed parameters, weak proof of one axis."""
     found, summary = result.axes[axis], result.summaries[axis]
     refit, units = result.refits.get(axis), found.base.axis.units
-    quiet = found.verdict is Verdict.NOTHING_MISSING
     every = [
         refit and refit_in_words(refit),
         *prepared_in_words(found.dataset),
@@ -255,7 +256,6 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
         found.repeat and repeat_in_words(found.repeat),
         None if found.dataset.holdout else NO_SELECTION_LOG,
         summary.noise and aliasing_in_words(summary.noise, units),
-        _beyond_in_words(summary, units.words("force error")) if quiet else None,
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]
     if axis in result.not_planned:
@@ -282,12 +282,12 @@ def _about_the_fits(found: AxisDiagnosis, summary: AxisSummary) -> list[str]:
     return said + [f"{with_it}, {words(moved_in_words(m))}" for m in summary.moved]
 
 
-def _beyond_in_words(summary: AxisSummary, error: str) -> str | None:
-    """That the selection logs show what the training logs do not; None where they do not."""
+def _beyond_in_words(summary: AxisSummary, error: str) -> list[str]:
+    """That the selection logs show what the training logs do not; nothing where they do not."""
     if summary.selection_ratio is None or summary.selection_ratio < RULE.at_floor:
-        return None
-    return (
-        f"this holds for the training logs alone: on the selection logs the {error} is "
+        return []
+    return [
+        f"This holds for the training logs alone: on the selection logs the {error} is "
         f"{summary.selection_ratio:.1f} times its noise floor. Give such a log as a training log "
-        "too"
-    )
+        "too."
+    ]

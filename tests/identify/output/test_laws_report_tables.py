@@ -76,9 +76,9 @@ def test_the_ledger_has_the_unit_of_its_largest_error():
     rising = (replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713),)
     assert growth_table(rising, {}).rows[0].cells[1:3] == ("0.0341 N", "0.713 N")
     table = growth_table(made.STEPS, {})
-    assert [c.numeric for c in table.columns] == [False] + 6 * [True]
-    assert [c.numeric for c in growth_table(rising, {}).columns] == [False] + 4 * [True]
-    assert [c.numeric for c in logs(subject_of().views[0])[0].columns] == [False] + 5 * [True]
+    assert table.numeric == [False] + 6 * [True]
+    assert growth_table(rising, {}).numeric == [False] + 4 * [True]
+    assert logs(subject_of().views[0])[0].numeric == [False] + 5 * [True]
 
 
 def test_each_section_has_its_anchor_and_title():

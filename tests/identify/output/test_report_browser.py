@@ -12,8 +12,6 @@ from browser import Browser, browser
 from report_cases import Case, cogging_case
 
 from identify import workflow
-from identify.output.as_json import json_of
-from identify.output.numbers import PREFIXES
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.machine import Fitted
@@ -189,45 +187,6 @@ def test_texts_have_contrast_and_controls_have_names(page: Browser) -> None:
       return [low, unnamed.map(e => e.outerHTML)];
     """)
     assert found == [[], []]
-
-
-# --- one source: the page's numbers are those of the JSON -----------------------------------
-
-
-def number(cell: str) -> float:
-    """A printed number with a prefixed unit, SI."""
-    value, _, unit = cell.replace("−", "-").partition(" ")
-    size = {f"{prefix}{unit}": size for size, prefix in PREFIXES for unit in ("N", "m")}
-    return float(value) * size.get(unit, 1.0)
-
-
-def test_the_pages_numbers_are_those_of_the_json(page: Browser, case: Case) -> None:
-    rows = page.run("""const cells = row => [...row.cells].map(c => c.textContent);
-      const of = id => Object.fromEntries([...document.querySelectorAll(`#${id} tbody tr`)]
-        .map(cells).map(([name, ...rest]) => [name, rest]));
-      const tiles = Object.fromEntries([...document.querySelectorAll(".tiles div")].map(
-        d => [d.children[0].textContent, d.children[1].textContent]));
-      return {logs: of("logs"), ranking: of("ranking"), found: of("found"), tiles};""")
-    told = json_of(case.diagnosis)
-    compared = json_of(case.diagnosis.comparison)["axes"]["x"]
-    for name, one in compared["logs"].items():
-        cells = rows["logs"][name]
-        expected = [one["force_error"], one["force_ratio"], one["position_error"]]
-        assert [number(c) for c in cells[1:4]] == pytest.approx(expected, rel=0.006)
-    for one in told["ranking"]:
-        if one["delta_bic"] is not None:
-            cells = rows["ranking"][one["effect"].replace("_", " ").capitalize()]
-            expected = [one["delta_bic"], one["holdout_error_before"], one["holdout_error_after"]]
-            assert [number(c) for c in cells[:3]] == pytest.approx(expected, rel=0.006)
-            assert cells[4] == (one["why_not"] or "")
-    (finding,) = told["findings"]
-    errors = [number(c) for c in rows["found"]["Cogging"][:2]]
-    tested = [finding["test_error_before"], finding["test_error_after"]]
-    assert errors == pytest.approx(tested, rel=0.006)
-    before, after = rows["tiles"]["Error over noise floor"].split(" → ")
-    floor = told["noise_floor"]
-    ratios = [told["force_error"] / floor, told["force_error_with_found"] / floor]
-    assert [number(before), number(after)] == pytest.approx(ratios, rel=0.006)
 
 
 # --- long logs ------------------------------------------------------------------------------

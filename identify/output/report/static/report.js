@@ -168,7 +168,7 @@ if (data.length) {
   function motion(common, hooks) {
     const against = $("against").value;  // a phase turns too often to be read over time
     const name = against === "time" || against.endsWith("_phase") ? "position" : against, s = axis.of(name);
-    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), logs in a row", label(s)],
+    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), logs in a row", s.unit || "1"],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
   }
@@ -254,8 +254,8 @@ if (data.length) {
         ctx.globalAlpha = 1;
       }]},
     }, [[low, ...at, high === low ? low + 1 : high], ...values]);
-    $("coordinate-note").textContent = `Dots: ${axis.texts.dots} of ${where}; lines: their means. `
-      + (floor ? `Grey: the noise floor of the training logs, ±${digits(axis.floor)} ${unit}.` : "")
+    $("coordinate-note").textContent = `Dots: single test functions of ${where}; lines: their means. `
+      + (floor ? `Grey: the noise floor of the training logs, ±${axis.texts.floor}.` : "")
       + (axis.every > 1 ? ` Of every ${axis.every} test functions one and the extremes are shown.` : "");
     return u;
   }
@@ -294,7 +294,7 @@ if (data.length) {
       },
     }, [[x0, x0 + columns * dx], [null, null]]);
     $("map-scale").replaceChildren(...RAMP.map(c => Object.assign(document.createElement("i"), {style: `background:${c}`})));
-    $("map-note").textContent = `RMS of ${where}: from the noise floor ${digits(axis.floor)} ${unit} and less (lightest) to ${digits(top)} ${unit} (darkest), in equal ratios.`;
+    $("map-note").textContent = `RMS of ${where}: from the noise floor ${axis.texts.floor} and less (lightest) to ${digits(top)} ${unit} (darkest), in equal ratios.`;
   }
 
   const on = (id, job) => $(id).addEventListener("change", job);
