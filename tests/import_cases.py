@@ -20,6 +20,19 @@ current = {column = "i", unit = "mA"}
 """
 
 
+def map_of(
+    position: str, force: str, *, units: tuple[str, str] = ("mm", "N"), axis: str = "x",
+    clock: str = "sample_rate = 1000.0",
+) -> str:  # fmt: skip
+    """A map of two columns. clock: its first line, or the column of times in a unit, "t in s"."""
+    column, _, unit = clock.partition(" in ")
+    first = f'time = {{column = "{column}", unit = "{unit}"}}' if unit else clock
+    return (
+        f'{first}\n[axes.{axis}]\nposition = {{column = "{position}", unit = "{units[0]}"}}\n'
+        f'force = {{column = "{force}", unit = "{units[1]}"}}\n'
+    )
+
+
 def table() -> dict[str, np.ndarray]:
     """Columns t (s), q (mm), i (mA, whole numbers) and one that no map names."""
     t = np.arange(COUNT) / RATE

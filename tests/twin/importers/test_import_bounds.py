@@ -9,18 +9,13 @@ from struct import pack
 import numpy as np
 import pytest
 import scipy.io
-from import_cases import mapping
+from import_cases import map_of, mapping
 
 from twin.errors import InputError
 from twin.importers import import_log
 from twin.importers.formats import content_bytes
 
-MAP = """
-sample_rate = 1000.0
-[axes.x]
-position = {column = "q", unit = "m"}
-force = {column = "q", unit = "N"}
-"""
+MAP = map_of("q", "q")
 ZEROS = 10**11  # samples
 
 
@@ -41,9 +36,7 @@ def write_mat(path: Path) -> None:
     head = pack("<IIIIIIiiIIQII", 6, 8, 6, 0, 5, 8, 1, size // 8, 1, 1, ord("q"), 9, size)
     deflate = zlib.compressobj(9)
     data = deflate.compress(pack("<II", 14, len(head) + size) + head)
-    data += deflate.flush(
-        zlib.Z_FULL_FLUSH
-    )  # what follows does not refer to it, and may be repeated
+    data += deflate.flush(zlib.Z_FULL_FLUSH)  # what follows does not refer to it: it may repeat
     data += 256 * (deflate.compress(bytes(size >> 8)) + deflate.flush(zlib.Z_FULL_FLUSH))
     path.write_bytes(
         b"MATLAB 5.0 MAT-file".ljust(124) + pack("<HH", 0x0100, 0x4D49)

@@ -8,19 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from import_cases import MAP as PLAIN
-from import_cases import mapping
+from import_cases import map_of, mapping
 
 from twin.errors import InputError
 from twin.importers import import_log
 from twin.logs import Log
 
-MAP = """
-time = {column = "t", unit = "s"}
-resample = 1000.0
-[axes.x]
-position = {column = "q", unit = "mm"}
-force = {column = "f", unit = "N"}
-"""
+MAP = "resample = 1000.0\n" + map_of("q", "f", clock="t in s")
 
 
 def imported(folder: Path, columns: dict[str, np.ndarray], text: str = MAP) -> Log:

@@ -13,7 +13,7 @@ from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Kind
 from google.protobuf.descriptor_pb2 import FileDescriptorProto
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
-from import_cases import mapping
+from import_cases import map_of, mapping
 from mcap.opcode import Opcode
 from mcap_bytes import of
 
@@ -64,11 +64,7 @@ def scope(*, shared: bool, decimal: str = ",", end: str = "EOF\r\n", step: str =
     return "\r\n".join([*head, *rows]) + "\r\n" + end
 
 
-SCOPE_MAP = """
-[axes.x]
-position = {column = "MAIN.fPos", unit = "mm"}
-force = {column = "MAIN.fForce", unit = "N"}
-"""
+SCOPE_MAP = map_of("MAIN.fPos", "MAIN.fForce", clock="")
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -79,7 +75,7 @@ def test_twincat_scope(tmp_path, shared, decimal, end):
     assert log.sample_rate == 1000.0
     assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
     assert_signals(log)
-    timed = 'time = {column = "time", unit = "ms"}' + SCOPE_MAP
+    timed = map_of("MAIN.fPos", "MAIN.fForce", clock="time in ms")
     assert_signals(imported(tmp_path, "a.csv", timed))
 
 
@@ -127,12 +123,9 @@ def write_joint_states(path: Path) -> None:
 @pytest.mark.parametrize("time", ["header.stamp", "log_time"])
 def test_joint_states_of_ros_2(tmp_path, entry, time):
     write_joint_states(tmp_path / "a.mcap")
-    text = f"""
-time = {{column = "/joint_states.{time}", unit = "s"}}
-[axes.elbow]
-position = {{column = "/joint_states.position{entry}", unit = "mrad"}}
-force = {{column = "/joint_states.effort{entry}", unit = "Nm"}}
-"""
+    position, force = (f"/joint_states.{name}{entry}" for name in ("position", "effort"))
+    clock = f"/joint_states.{time} in s"
+    text = map_of(position, force, units=("mrad", "Nm"), axis="elbow", clock=clock)
     log = imported(tmp_path, "a.mcap", text)
     assert (log.sample_rate, log.axes["elbow"].kind.kind) == (1000.0, "rotary")
     assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
@@ -181,30 +174,13 @@ def test_protobuf_of_other_programs(tmp_path, column):
             writer.write_message("/state", message, log_time=k * 10**6)
         writer.finish()
     q, f = ("1", "2") if "values" in column else ("position", "effort")
-    log = imported(
-        tmp_path,
-        "a.mcap",
-        f"""
-time = {{column = "/state.stamp", unit = "s"}}
-[axes.x]
-position = {{column = "/state.{column.format(q)}", unit = "mm"}}
-force = {{column = "/state.{column.format(f)}", unit = "N"}}
-""",
-    )
+    position, force = (f"/state.{column.format(name)}" for name in (q, f))
+    log = imported(tmp_path, "a.mcap", map_of(position, force, clock="/state.stamp in s"))
     assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9)
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, rtol=0, atol=1e-12)
     np.testing.assert_allclose(log.axes["x"].force, F, rtol=1e-6)  # effort is a float of 32 bits
     with pytest.raises(InputError, match=r"no column '/state.jaw'; .*/state.joints.elbow.effort"):
-        imported(
-            tmp_path,
-            "a.mcap",
-            """
-sample_rate = 1000.0
-[axes.x]
-position = {column = "/state.jaw", unit = "mm"}
-force = {column = "/state.jaw", unit = "N"}
-""",
-        )
+        imported(tmp_path, "a.mcap", map_of("/state.jaw", "/state.jaw"))
 
 
 def test_json_in_mcap_and_a_damaged_one(tmp_path):
@@ -219,12 +195,7 @@ def test_json_in_mcap_and_a_damaged_one(tmp_path):
             text = json.dumps(message)
             writer.add_message(channel, k * 10**6, text.encode(), k * 10**6)
         writer.finish()
-    text = """
-sample_rate = 1000.0
-[axes.x]
-position = {column = "/drive.a.q", unit = "mm"}
-force = {column = "/drive.f[1]", unit = "N"}
-"""
+    text = map_of("/drive.a.q", "/drive.f[1]")
     assert_signals(imported(tmp_path, "a.mcap", text))
     intact = (tmp_path / "a.mcap").read_bytes()
     chunk = [r.start for r in of(intact, Opcode.CHUNK)][2]
@@ -247,11 +218,6 @@ def test_times_since_1970_are_shown_as_dates(tmp_path):
     t[200:] += 0.5
     rows = [f"{float(a)!r},{float(q)!r}" for a, q in zip(t, Q, strict=True)]
     (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
-    text = """
-time = {column = "t", unit = "s"}
-[axes.x]
-position = {column = "q", unit = "mm"}
-force = {column = "q", unit = "N"}
-"""
+    text = map_of("q", "q", clock="t in s")
     with pytest.raises(InputError, match=r"gap: 2023-11-14 22:13:20\.199 UTC is followed by 2023"):
         imported(tmp_path, "a.csv", text)

@@ -17,6 +17,7 @@ from import_cases import (
     COUNT,
     MAP,
     RATE,
+    map_of,
     mapping,
     table,
     write_csv,
@@ -215,13 +216,8 @@ def changed(write: Callable[[Path, Columns], None], **columns: object) -> Callab
 DATES = np.datetime64("2024-05-01T12:00:00", "us") + np.arange(COUNT) * np.timedelta64(500, "us")
 RATED = "sample_rate = 2000.0"
 DATED = MAP.replace(RATED, 'time = {column = "t", unit = "s"}')
-WAVES = """
-sample_rate = 50.0
-[axes.x]
-position = {column = "r/0", unit = "m"}
-force = {column = "r/1", unit = "N"}
-"""
-WITHOUT_RATE = WAVES.replace("sample_rate = 50.0", "")
+WAVES = map_of("r/0", "r/1", clock="sample_rate = 50.0")
+WITHOUT_RATE = map_of("r/0", "r/1", clock="")
 
 
 @pytest.mark.parametrize(
