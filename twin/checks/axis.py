@@ -9,20 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks import limits
-from twin.checks.explain import (
-    Dynamics,
-    Lag,
-    Smoother,
-    Trend,
-    find_lag,
-    find_trend,
-    fit_dynamics,
-)
+from twin.checks.explain import Dynamics, Lag, Smoother, Trend, find_lag, find_trend, fit_dynamics
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, white_noise
-
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +94,11 @@ class Axis:
         """(m,) low-passed command, N."""
         return self.smoother.held(self.log.force)
 
+    @property
+    def still(self) -> float:
+        """Speed in m/s below which the noise of the position may be all there is."""
+        return limits.MOVING * self.smoother.velocity_noise(self.position_noise)
+
     @cached_property
     def moves(self) -> bool:
         """Whether the position covers more than its noise can, and is in motion for 0.3 s in all.
@@ -112,15 +107,13 @@ class Axis:
         """
         if not np.ptp(self.log.position) > limits.COVERED * self.position_noise:
             return False
-        fast = limits.MOVING * self.smoother.velocity_noise(self.position_noise)
-        moving = np.count_nonzero(np.abs(self.velocity) > fast)
+        moving = np.count_nonzero(np.abs(self.velocity) > self.still)
         return bool(moving * self.smoother.block > limits.LEAST_MOTION)
 
     @cached_property
     def moves_often(self) -> bool:
         """Whether a tenth of the log or more has motion beyond the noise of the encoder."""
-        speed = float(np.quantile(np.abs(self.velocity), 0.9))
-        return speed > limits.MOVING * self.smoother.velocity_noise(self.position_noise)
+        return float(np.quantile(np.abs(self.velocity), 0.9)) > self.still
 
     @cached_property
     def possible_jump(self) -> float:
@@ -168,15 +161,9 @@ class Axis:
         same = abs(beside.seconds - found.seconds) < limits.SAME_LAG * abs(found.seconds)
         return found if beside.clear and same else Lag(0.0, False)
 
-    @cached_property
-    def trend(self) -> Trend | None:
-        """The same in each part of the log."""
-        return find_trend(self.force, self.regressors, self.kept, self.smoother.block)
-
-    @cached_property
-    def trend_beside_memory(self) -> Trend | None:
-        """The same beside friction with a memory."""
-        return find_trend(self.force, self.remembering, self.kept, self.smoother.block)
+    def trend(self, regressors: Array) -> Trend | None:
+        """The same in each part of the log, beside some regressors of the command."""
+        return find_trend(self.force, regressors, self.kept, self.smoother.block)
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -191,15 +178,10 @@ class Axis:
         """(m, 5) regressors of a command: mass, damping, Coulomb friction, bias, stiffness."""
         fast = float(np.quantile(np.abs(self.velocity), 0.99))
         position = self.smoother.position(self.log.position)
-        return np.column_stack(
-            [
-                self.acceleration,
-                self.velocity,
-                self.smoother.direction(self.log.position, max(limits.SLOW_SPEED * fast, _TINY)),
-                np.ones_like(position),
-                position - position.mean(),
-            ]
-        )
+        slow = max(limits.SLOW_SPEED * fast, float(np.finfo(float).tiny))
+        direction, one = self.smoother.direction(self.log.position, slow), np.ones_like(position)
+        centred = position - position.mean()
+        return np.column_stack([self.acceleration, self.velocity, direction, one, centred])
 
     @cached_property
     def remembering(self) -> Array:
@@ -221,17 +203,12 @@ class Axis:
         goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
         if np.std(position) > limits.FALLS_SHORT * np.std(goal):
             return False
-        rates = np.column_stack(
-            [np.ones_like(goal), self.velocity, self.smoother.velocity(setpoint)]
-        )
-        spring, left = _fitted(self.force, np.column_stack([goal - position, rates]))
-        apart = _fitted(self.force, np.column_stack([goal, position, rates]))[1]
+        rates = [np.ones_like(goal), self.velocity, self.smoother.velocity(setpoint)]
+        spring, left = _fitted(self.force, np.column_stack([goal - position, *rates]))
+        apart = _fitted(self.force, np.column_stack([goal, position, *rates]))[1]
         size = float(np.std(self.force))
-        return (
-            spring > 0.0
-            and left < limits.SPRING * size
-            and left < max(limits.AS_GOOD_GAINS * apart, limits.WELL * size)
-        )
+        as_good = left < max(limits.AS_GOOD_GAINS * apart, limits.WELL * size)
+        return spring > 0.0 and left < limits.SPRING * size and as_good
 
 
 def _fitted(signal: Array, columns: Array) -> tuple[float, float]:
@@ -267,10 +244,8 @@ def count_of(signal: Array) -> float:
         return 0.0
     for count in np.quantile(ways, limits.ONE_COUNT):
         off = np.abs(ways / count - np.round(ways / count))
-        if (
-            ways[(off < limits.WHOLE_WAY) & (ways > 0.5 * count)].sum()
-            > limits.OF_WHOLE_WAYS * ways.sum()
-        ):
+        whole = ways[(off < limits.WHOLE_WAY) & (ways > 0.5 * count)]
+        if whole.sum() > limits.OF_WHOLE_WAYS * ways.sum():
             return float(count)
     return 0.0
 

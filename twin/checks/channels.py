@@ -52,7 +52,7 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
 
 def _steady(axis: Axis) -> Iterator[Finding]:
     """A lag or a drift too small to be seen at once, but the same in all parts of the log."""
-    trend = axis.trend
+    trend = axis.trend(axis.regressors)
     if trend is None or not axis.dynamics.explains:
         return
     if abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error):
@@ -64,7 +64,7 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "record both with one clock, or import each with time stamps",
         )
         return
-    if _is_steady(axis, trend) and _is_steady(axis, axis.trend_beside_memory):
+    if _is_steady(axis, trend) and _is_steady(axis, axis.trend(axis.remembering)):
         what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
         told = f"{what}, +- {trend.error * 1e3:.2g} ms"
         yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)
@@ -187,20 +187,16 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     ratio = product / power
     if pair.allowed[0] <= ratio <= pair.allowed[1]:
         return
-    if ratio < 0.0:
-        fault, looks = Fault.SIGN, "one of them is reversed"
-    else:
+    wrong = "one of them is reversed"
+    if ratio > 0.0:
         off = abs(np.log(ratio))
-        near = [s for s in _SLIPS if abs(off - np.log(s)) < limits.LOOKS_LIKE]
+        near = [text for s, text in _SLIPS.items() if abs(off - np.log(s)) < limits.LOOKS_LIKE]
         if not near and pair.follows and axis.soft_loop:
             return
-        looks = (
-            f"it looks like {_SLIPS[near[0]]}" if near else "a scale or the sample rate is wrong"
-        )
-        fault = Fault.UNIT
+        wrong = f"it looks like {near[0]}" if near else "a scale or the sample rate is wrong"
     yield axis.error(
-        fault,
-        f"{pair.name} is {ratio:.4g} times {pair.other_name}: {looks}",
+        Fault.SIGN if ratio < 0.0 else Fault.UNIT,
+        f"{pair.name} is {ratio:.4g} times {pair.other_name}: {wrong}",
         "correct unit, scale, sign or sample rate in the import map",
     )
 

@@ -174,15 +174,14 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
         return Lag(0.0, False)
     nearest = int(np.argmin(np.abs(dips[good] - reach)))  # a periodic motion has several
     best = int(dips[good][nearest])
+    samples = float(best - reach + fraction[good][nearest])
     clear = (
         residual[best] < limits.CLEAR_LAG**2 * total[best]
         and residual[reach] > limits.WRONG_LAG**2 * total[reach]
         and residual[best] < limits.BETTER_LAG**2 * residual[reach]
+        and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
     )
-    samples = float(best - reach + fraction[good][nearest])
-    return Lag(
-        samples * block, bool(clear) and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
-    )
+    return Lag(samples * block, bool(clear))
 
 
 def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
