@@ -86,6 +86,16 @@ def back_for(sign: float):
     return make
 
 
+def slow(mass: float) -> Log:
+    """Slow moves of a mass with friction."""
+    t = np.arange(40_000) / 1000.0
+    position = 0.05 * np.sin(0.5 * t) + 0.02 * np.sin(0.35 * t + 1.0)
+    velocity = 0.025 * np.cos(0.5 * t) + 0.007 * np.cos(0.35 * t + 1.0)
+    force = 1.5 * np.tanh(velocity / 1e-4) + 40.0 * velocity + mass * np.gradient(velocity, t)
+    noise = 1e-8 * np.random.default_rng(1).standard_normal(len(t))
+    return Log(1e3, {"x": AxisLog({"position": position + noise, "force": force})})
+
+
 def spread(units):
     """Triangles of speed around 0.2 m/s, both ways: nine tenths less one are 0.8 of the spread."""
 
@@ -192,6 +202,7 @@ CASES = {
                      "the axis moves only forwards (", 98.5),
     "backwards": Case(back_for(-1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                       "the axis moves only backwards (", 98.5),
+    "slow": Case(slow, [5.0], 0.0, Fault.WEAK_EXCITATION, "the mass cannot be identified"),
     "one speed": Case(spread(LINEAR_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
                       "there is one speed only, 0.2 m/s, "),
     "one rotary speed": Case(spread(ROTARY_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,

@@ -15,13 +15,11 @@ import pytest
 from check_cases import Columns, clean_log, faults, late, milliseconds, only, stage, with_axis
 from planted_faults import COLUMN_SETS, FAULTS, HIDDEN, with_columns
 
-from twin.checks import Fault, Severity, check_log
+from twin.checks import Fault, check_log
 from twin.experiments.named import simulate
-from twin.logs import AxisLog, Log
+from twin.logs import Log
 from twin.logs.log import Array
 
-BURST = 100  # samples, 10 ms
-MIDDLE = 30_000
 SETS = list(COLUMN_SETS)
 SHOWN = {name: [s for s in SETS if (name, s) not in HIDDEN] for name in FAULTS}
 ROUNDS = {name: SHOWN[name][i % len(SHOWN[name])] for i, name in enumerate(FAULTS)}
@@ -64,56 +62,26 @@ def test_clean_logs_are_called_clean() -> None:
     assert not [w for w in wrong if "hardly moves" not in w and "moves only" not in w]
 
 
-@pytest.mark.parametrize("lag", [-50.0, 50.0])
-def test_a_position_recorded_late_contradicts_force_and_setpoint(lag: float) -> None:
-    report = check_log(with_axis(clean_log(), "x", late(round(lag * 10), "position")))
-    against_force, against_setpoint = report.findings
-    assert milliseconds(against_force) == pytest.approx(-lag, abs=0.3)
-    assert milliseconds(against_setpoint) == pytest.approx(lag, abs=0.5)
-    assert not report.ok
-    column = "position" if lag > 0 else "force"
-    assert re.match(rf"give {column} delay_samples = (499|500|501) ", against_force.remedy)
+def burst(shape: Array) -> Callable[[Columns], Columns]:
+    """A burst of 10 ms on the position."""
 
-
-# Outliers
-
-
-def burst(name: str, shape: Array, at: int = MIDDLE) -> Callable[[Columns], Columns]:
     def plant(columns: Columns) -> Columns:
-        columns[name][at : at + len(shape)] += shape
+        columns["position"][30_000:30_100] += shape
         return columns
 
     return plant
 
 
-HALF_SINE = np.sin(np.pi * np.arange(BURST) / BURST)
-NOISE = np.random.default_rng(0).standard_normal(BURST)
-OFFSET = np.ones(BURST)
-
-
-@pytest.mark.parametrize(
-    ("name", "shape", "message"),
-    [
-        ("position", 1e-5 * OFFSET, "samples of the position are off"),
-        ("position", 1e-6 * NOISE, "position bends"),
-        ("position", 1e-4 * HALF_SINE, "samples of the position are off"),
-        ("force", 20.0 * OFFSET, "force and motion contradict each other"),
-        ("force", 20.0 * HALF_SINE, "force and motion contradict each other"),
-        ("force", 5.0 * NOISE, "force jumps to and fro"),
-    ],
-)
-def test_a_burst_of_10_ms(name: str, shape: Array, message: str) -> None:
-    report = check_log(with_axis(clean_log(), "y", burst(name, shape)))
-    finding = only(report, Fault.OUTLIERS)
-    assert message in finding.what
+def test_a_burst_of_little_noise_is_told_where_it_is() -> None:
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(100)
+    finding = only(check_log(with_axis(clean_log(), "y", burst(noise))), Fault.OUTLIERS)
+    assert finding.what.startswith("position bends by up to")
     start, end = (float(w) for w in finding.where.removesuffix(" s").split(" to "))
-    assert start == pytest.approx(MIDDLE / 1e4, abs=0.011)
-    assert end == pytest.approx((MIDDLE + BURST) / 1e4, abs=0.011)
-    assert finding.severity is Severity.ERROR
+    assert (start, end) == (pytest.approx(3.0, abs=0.011), pytest.approx(3.01, abs=0.011))
 
 
 def test_a_burst_does_not_hide_a_lag() -> None:
-    both = with_axis(clean_log(), "x", burst("position", 1e-3 * OFFSET))
+    both = with_axis(clean_log(), "x", burst(np.full(100, 1e-3)))
     report = check_log(with_axis(both, "x", late(500, "force", "current")))
     assert faults(report) == {Fault.LAG, Fault.OUTLIERS}
     assert milliseconds(only(report, Fault.LAG)) == pytest.approx(50.0, abs=0.3)
@@ -126,14 +94,3 @@ def test_a_finding_is_one_sentence_with_axis_place_and_remedy() -> None:
         r"give force delay_samples = \d+ in the import map",
         str(only(report, Fault.LAG)),
     )
-
-
-def test_a_mass_that_no_acceleration_shows_is_named():
-    t = np.arange(40_000) / 1000.0
-    position = 0.05 * np.sin(0.5 * t) + 0.02 * np.sin(0.35 * t + 1.0)
-    velocity = 0.025 * np.cos(0.5 * t) + 0.007 * np.cos(0.35 * t + 1.0)
-    noise = 1e-8 * np.random.default_rng(1).standard_normal(len(t))
-    slow = {"position": position + noise, "force": 1.5 * np.tanh(velocity / 1e-4) + 40.0 * velocity}
-    (found,) = check_log(Log(1000.0, {"x": AxisLog(slow)})).findings
-    assert found.fault is Fault.WEAK_EXCITATION
-    assert "the mass cannot be identified" in found.what

@@ -98,14 +98,6 @@ def test_a_killed_recording_is_recovered_and_the_next_replaces_it(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.mcap"]
 
 
-@pytest.mark.parametrize(
-    ("name", "why"), [("no/such/folder/a.mcap", "its folder does not exist"), (".", "is a folder")]
-)
-def test_a_place_that_cannot_be_written_is_named(tmp_path, name, why):
-    with pytest.raises(InputError, match=why):
-        write_log(LOG, tmp_path / name)
-
-
 def with_x(log: Log, **columns: np.ndarray) -> Log:
     axis = replace(log.axes["x"], columns={**log.axes["x"].columns, **columns})
     return replace(log, axes={**log.axes, "x": axis})
