@@ -48,8 +48,8 @@ from twin.logs.series import require_even, require_finite, seconds
 from twin.logs.topics import Topic, Topics
 from twin.logs.writer import write_parts
 
+GAP = "a gap separates them from the longer run"
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
-_GAP = "a gap separates them from the longer run"
 INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time: some 20 MB
 STEP = 1 << 15  # the same of a damaged one, whose chunks are held beside them
 
@@ -292,7 +292,15 @@ class _Salvage:
         self._extras.metadata.pop("sample_rate_hz", None)
         longest = max(stretches, key=lambda s: len(s.samples) * len(s.pieces))
         longest.empty(self._extras)
-        kept = [longest, *self._others(stretches, longest)]
+        kept, topics = [longest], {topic for s in stretches for topic in s.pieces}
+        for stretch in (s for s in stretches if s is not longest):
+            absent = ", ".join(sorted(topics - stretch.pieces.keys()))
+            why = f"{absent} has no samples there" if absent else GAP
+            with self._losing(), at(str(stretch)):
+                stretch.empty(self._extras)
+                kept.append(stretch)
+                said = str(stretch).replace("samples", "intact samples")
+                self._lost.append(f"{said} are in a log of their own: {why}")
         unproved = [METADATA] if self._extras.metadata and not self._extras.proved else []
         (unproved if self._keep_unproved else self._lost).extend(self._unproved)
         lost = tuple(dict.fromkeys(self._lost))
@@ -315,21 +323,6 @@ class _Salvage:
         """The samples of a piece, read from the file again."""
         blocks = self._topics.blocks(self._content(piece.chunk))
         return next(block for block in blocks if block.channel == piece.topic.layout.channel)
-
-    def _others(self, stretches: list[_Stretch], longest: _Stretch) -> Iterator[_Stretch]:
-        topics = {topic for s in stretches for topic in s.pieces}
-        for stretch in stretches:
-            if stretch is longest:
-                continue
-            absent = ", ".join(sorted(topics - stretch.pieces.keys()))
-            why = f"{absent} has no samples there" if absent else _GAP
-            with self._losing(), at(str(stretch)):
-                stretch.empty(self._extras)
-                yield stretch
-                self._lost.append(
-                    f"{str(stretch).replace('samples', 'intact samples')} are in a log of their "
-                    f"own: {why}"
-                )
 
     def _by_topic(self) -> dict[str, list[_Piece]]:
         """The pieces of each topic by their numbers, each once; topics in the order of the file."""
