@@ -133,7 +133,7 @@ def test_a_clock_that_skips_is_less_than_two_samples_motion(part, fault, words, 
 
 
 @pytest.mark.parametrize(
-    ("count", "seconds", "uneven"), [(11, 4.0, False), (13, 4.0, True), (20, 30.0, False)]
+    ("count", "seconds", "uneven"), [(11, 4.0, False), (13, 8.0, True), (20, 30.0, False)]
 )
 def test_from_twelve_places_and_one_a_second_on_it_is_the_clock(count, seconds, uneven):
     def change(columns):

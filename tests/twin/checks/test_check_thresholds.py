@@ -110,8 +110,13 @@ def spread(units):
 def moving(share: float) -> Log:
     """Noise of a micrometre all the time, motion of centimetres for a share of it."""
     t = 10.0 + T
-    position = motion(np.clip(t, 12.0, 12.0 + 6.0 * share)) + 1e-6 * WHITE
-    return Log(1000.0, {"x": AxisLog({"position": position, "force": command(t)})})
+    return noisy(motion(np.clip(t, 12.0, 12.0 + 6.0 * share)))
+
+
+def noisy(position: Array) -> Log:
+    """A position beside noise of a micrometre."""
+    columns = {"position": position + 1e-6 * WHITE, "force": command(T)}
+    return Log(1000.0, {"x": AxisLog(columns)})
 
 
 def held_at(rate: float, sign: float, fewest: int):
@@ -165,6 +170,7 @@ BEND = float(np.abs(np.diff(SOUND.log.position, 2)).max())
 COARSE = (
     0.3 * np.sqrt(np.mean(SOUND.acceleration**2)) / SOUND.smoother.acceleration_noise(1.0)
 )  # m rms, of which the acceleration has noise of three tenths
+SLOWEST = SOUND.smoother.velocity_noise(1e-6)
 SINGLE = axis_of(drive(coulomb=0.0)).force_size
 SPREAD = float(np.std(SOUND.log.force))
 BURST = np.random.default_rng(2).standard_normal(30)
@@ -198,11 +204,16 @@ CASES = {
     "coarse": Case(added("position", slice(None), WHITE[:4000]), [0.8 * COARSE], 1.25 * COARSE,
                    Fault.COARSE_POSITION, "the position is good to ", 1.25 * COARSE, "whole log"),
     "idle": Case(moving, [0.16], 0.06, Fault.WEAK_EXCITATION, "the noise of its position (", 1e-6),
+    # nine tenths of normal noise stay below 1.28 of its rms, which adds to the speed
+    "a speed in its noise": Case(lambda times: noisy(times * SLOWEST * T), [4.2], 3.3,
+                                 Fault.WEAK_EXCITATION, "the axis hardly moves"),
+    "a way in its noise": Case(lambda size: noisy(size * np.sin(100.0 * T)), [7e-6], 2e-6,
+                               Fault.WEAK_EXCITATION, "the axis hardly moves"),
     "forwards": Case(back_for(1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                      "the axis moves only forwards (", 98.5),
     "backwards": Case(back_for(-1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                       "the axis moves only backwards (", 98.5),
-    "slow": Case(slow, [5.0], 0.0, Fault.WEAK_EXCITATION, "the mass cannot be identified"),
+    "slow": Case(slow, [1.6], 0.8, Fault.WEAK_EXCITATION, "the mass cannot be identified"),
     "one speed": Case(spread(LINEAR_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
                       "there is one speed only, 0.2 m/s, "),
     "one rotary speed": Case(spread(ROTARY_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
@@ -256,3 +267,24 @@ def test_a_fault_is_told_from_its_threshold_on_with_place_and_size(name):
     else:
         places = [float(word) for word in told.where.split() if word[0].isdigit()]
         assert places[: len(case.where)] == pytest.approx(case.where, abs=0.012)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_a_jump_is_possible_up_to_what_acceleration_and_noise_explain(noise):
+    """Four times the usual acceleration over a sample, and ten times the noise of a bend."""
+    axis = axis_of(added("position", slice(None), WHITE[:4000])(noise))
+    usual = np.quantile(np.abs(axis.acceleration), 0.99) / 1e6
+    bend = 6**0.5 * max(noise, axis.position_step / 12**0.5)
+    assert axis.possible_jump == pytest.approx(4.0 * usual + 10.0 * bend, rel=0.06)
+    assert not axis.jumps.any()
+
+
+@pytest.mark.parametrize(("apart", "where"), [(40, "2 to 2.1 s"), (70, "2 to 2.03 s and 1 more")])
+def test_bursts_that_are_more_than_fifty_milliseconds_apart_are_two(apart, where):
+    twice = np.concatenate([BURST, np.zeros(apart), BURST])
+    log = added("force", slice(2000, 2060 + apart), twice)(20.0)
+    (found,) = [f for f in findings(log, Fault.OUTLIERS) if "to and fro" in f.what]
+    first, last = (float(word) for word in re.findall(r"[\d.]+", found.where)[:2])
+    wanted = [float(word) for word in re.findall(r"[\d.]+", where)[:2]]
+    assert [first, last] == pytest.approx(wanted, abs=0.006)
+    assert ("1 more times" in found.where) == ("1 more" in where)
