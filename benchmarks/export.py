@@ -36,7 +36,7 @@ STRICT = ("-Wall", "-Wextra", "-Werror", "-std=c99", "-O2")
 PERIOD, SECONDS = 1e-4, 10.0
 HIDDEN = (
     "cogging", "force_constant_ripple", "position_dependent_friction", "actuator_lag",
-    "cable_hysteresis", "periodic_disturbance",
+    "axis_coupling", "load_dependent_friction",
 )  # fmt: skip
 SEED = 11
 DRAWN = 8  # machines at most, until an effect shows
