@@ -265,14 +265,13 @@ def feedforward_text(result: Feedforward) -> str:
             "with the feedforward of the model before": found.before,
             "with that of the model": found.diagnosed,
         }
-        scale = Scale.of(unit, [found.without.rms])
         lines.append(f"axis {axis}: tracking error, RMS and largest")
         lines += [
-            f"  {name}: {scale.text(e.rms)}, {scale.text(e.largest)}"
+            f"  {name}: {quantity(e.rms, unit)}, {quantity(e.largest, unit)}"
             for name, e in errors.items()
             if e is not None
         ]
-        lines += [f"    {e} gains {scale.text(gain)}" for e, gain in found.gains.items()]
+        lines += [f"    {e} gains {quantity(gain, unit)}" for e, gain in found.gains.items()]
         lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]
     return "\n".join(lines)
 
