@@ -19,11 +19,13 @@ demo: $(VENV)/runtime
 	$(BIN)/twin demo --out demo
 	@echo "to use twin in this shell: $(ACTIVATE)"
 
-# Types are one of the tests (tests/test_types.py), so that they take no time of their own.
+# Types are one of the tests (tests/test_types.py), so that they take no time of their own. To rewrite
+# every assert, for its values, takes eight seconds: what fails is run again, with them.
 test: $(VENV)/tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
+	$(BIN)/python -m pytest --assert=plain -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" \
+		|| { $(BIN)/python -m pytest --last-failed; exit 1; }
 
 check: $(VENV)/tests
 	$(BIN)/ruff check .

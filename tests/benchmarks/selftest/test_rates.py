@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
 
 from benchmarks.selftest.confidence import LEAST_ANSWERS, MOST_LEVELS, levels
 from benchmarks.selftest.laws import OUTSIDE
@@ -176,6 +175,8 @@ def test_two_effects_need_an_answer_each():
 
 
 def test_a_rate_has_the_interval_of_its_binomial():
+    from scipy.stats import binomtest  # half a second to load
+
     for count, trials in ((0, 9), (3, 4), (31, 40), (12, 12)):
         exact = binomtest(count, trials).proportion_ci(0.95, "exact")
         assert Rate("", count, trials).interval == pytest.approx((exact.low, exact.high))

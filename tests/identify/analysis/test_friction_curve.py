@@ -6,7 +6,7 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
+from scipy.special import stdtrit  # scipy.stats takes half a second to load
 
 from identify.analysis.friction_curve import (
     LINE,
@@ -58,7 +58,7 @@ def test_a_curve_has_the_intervals_of_least_squares() -> None:
     columns, weight = found.curve.slopes(SPEEDS), np.diag(samples)
     left, freedom = found(SPEEDS) - CURVE(SPEEDS) - scatter, len(SPEEDS) - 4
     covariance = np.linalg.inv(columns.T @ weight @ columns) * (left @ weight @ left) / freedom
-    expected = student.ppf(0.95, freedom) * np.sqrt(np.diag(covariance))
+    expected = stdtrit(freedom, 0.95) * np.sqrt(np.diag(covariance))
     assert [found.half[n] for n in NAMES] == pytest.approx(expected, rel=1e-5)
 
 

@@ -173,9 +173,9 @@ def test_a_force_has_a_column_of_its_own(tmp_path):
 
 
 def test_a_long_table_is_written_in_parts_without_a_gap(tmp_path):
-    write_setpoints(Moves(400, duration=25.0), PROTON, 1, tmp_path / "s.csv")
-    time = read(tmp_path / "s.csv")["time [s]"]
-    assert len(time) > 2.4e5
+    write_setpoints(Moves(400, duration=11.0), PROTON, 1, tmp_path / "s.csv")
+    time = np.loadtxt(tmp_path / "s.csv", delimiter=",", skiprows=1, usecols=0)
+    assert len(time) > 1.05e5  # parts are of 1e5 rows
     np.testing.assert_allclose(np.diff(time), 1e-4, atol=1e-7)
 
 
