@@ -23,6 +23,13 @@ NUMBER = re.compile(rf"(-?([\d.]+(e[+-]\d+)?|∞)( \S+)?|{NOTHING})?")  # a cell
 CHART_DIGITS = 5  # significant, of a number that is drawn
 
 
+TEMPLATES = Environment(
+    loader=PackageLoader("identify.output.report", "."), autoescape=True,
+    undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+)  # fmt: skip
+TEMPLATES.filters.update(typeset=typeset)
+
+
 class Tone(Enum):
     """Weight of a table row or an answer; the value is its CSS class."""
 
@@ -202,34 +209,14 @@ def page(
     facts: under the title. signals: of each axis, to be explored beside the first section. origin:
     in the footer, what the page was made of. warnings: before the answer.
     """
-    return (
-        _templates()
-        .get_template("report.html.j2")
-        .render(
-            title=title,
-            facts=facts,
-            warnings=warnings,
-            sections=shown,
-            signals=signals,
-            drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),
-            origin=[("proton-twin", importlib.metadata.version("proton-twin")), *origin],
-        )
-    )
+    return TEMPLATES.get_template("report.html.j2").render(
+        title=title, facts=facts, warnings=warnings, sections=shown, signals=signals,
+        drawn=bool(signals) or any(isinstance(b, Chart) for s in shown for b in s.blocks),
+        origin=[("proton-twin", importlib.metadata.version("proton-twin")), *origin],
+    )  # fmt: skip
 
 
 def fragment(blocks: Sequence[Block]) -> str:
     """Blocks as HTML within another page, which has no script of ours."""
-    macros = _templates().get_template("blocks.html.j2").module
+    macros = TEMPLATES.get_template("blocks.html.j2").module
     return "".join(getattr(macros, "brief" if b.macro == "answer" else b.macro)(b) for b in blocks)
-
-
-def _templates() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("identify.output.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(typeset=typeset)
-    return environment
