@@ -25,17 +25,6 @@ def rotary(tmp_path_factory) -> Path:
     return path
 
 
-def test_it_is_what_was_written(rotary) -> None:
-    found = log_info(rotary)
-    assert (found.samples, found.sample_rate, found.duration) == (3000, 1000.0, 3.0)
-    assert found.metadata == {"source": "test rig 7"}
-    axis = found.axes["a"]
-    assert (axis.kind, axis.constant) == ("rotary", (0.25, "N m/A"))
-    told = {c.name: (c.unit, c.least, c.most) for c in axis.channels}
-    assert told["position"] == ("rad", pytest.approx(-0.5, abs=1e-5), pytest.approx(0.5, abs=1e-5))
-    assert told["current"] == ("A", pytest.approx(-1.0, abs=1e-5), pytest.approx(3.0, abs=1e-5))
-
-
 def test_ranges_are_those_of_the_whole_log_however_long(tmp_path, monkeypatch) -> None:
     path = tmp_path / "long.mcap"
     write_log(twin.simulate(twin.load_model("proton_xy"), "tracking", seed=1, duration=3.0), path)
@@ -45,7 +34,7 @@ def test_ranges_are_those_of_the_whole_log_however_long(tmp_path, monkeypatch) -
     assert log_info(path).samples == whole.samples == 30_000
 
 
-def test_the_command_prints_it_in_text_and_as_one_object(rotary) -> None:
+def test_what_was_written_is_told_in_text_and_as_one_object(rotary) -> None:
     said = cli_runs.twin("info", rotary, folder=rotary.parent)
     assert said.returncode == 0
     lines = said.stdout.splitlines()
@@ -54,11 +43,20 @@ def test_the_command_prints_it_in_text_and_as_one_object(rotary) -> None:
     assert "  axis a (rotary, force constant 0.25 N m/A)" in lines
     assert "    position  -0.499999 to 0.5 rad" in lines or "    position  -0.5 to 0.5 rad" in lines
     assert sum("check:" in line for line in lines) == 1
-    found = json.loads(cli_runs.twin("info", rotary, "--json", folder=rotary.parent).stdout)[
-        "logs"
-    ][str(rotary)]
+    done = cli_runs.twin("info", rotary, "--json", folder=rotary.parent)
+    found = json.loads(done.stdout)["logs"][str(rotary)]
     assert (found["duration"], found["duration_unit"], found["ok"]) == (3.0, "s", True)
-    assert found["axes"]["a"]["channels"]["current"]["unit"] == "A"
+    assert (found["samples"], found["sample_rate"]) == (3000, 1000.0)
+    assert found["metadata"] == {"source": "test rig 7"}
+    axis = found["axes"]["a"]
+    assert (axis["kind"], axis["force_constant"], axis["force_constant_unit"]) == (
+        "rotary", 0.25, "N m/A",
+    )  # fmt: skip
+    for name, unit, least, most in (("position", "rad", -0.5, 0.5), ("current", "A", -1.0, 3.0)):
+        told = axis["channels"][name]
+        assert (told["unit"], told["least"], told["most"]) == (
+            unit, pytest.approx(least, abs=1e-5), pytest.approx(most, abs=1e-5),
+        )  # fmt: skip
 
 
 def test_faults_are_one_line_and_a_file_that_is_no_log_too(tmp_path) -> None:

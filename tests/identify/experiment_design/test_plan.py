@@ -92,6 +92,10 @@ CASES = {
 TRUTHS = [(name, truth) for name, case in CASES.items() for truth in case.pair]
 
 
+def logged(machine: MachineModel, experiment: Experiment, seed: int) -> Logs:
+    return {f"log {seed}": simulate(machine, experiment, seed=seed, simulator=ReducedSimulator)}
+
+
 def separation(ranking) -> float:
     """Evidence of the best explanation over the other."""
     return ranking[0].delta_bic - ranking[1].delta_bic
@@ -106,22 +110,12 @@ QUICK = (("asymmetry", "asymmetric_friction"),)
     [t if t in QUICK else pytest.param(*t, marks=pytest.mark.slow) for t in TRUTHS],
 )
 def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
-    assert_resolved(CASES[name], truth, Catalogue([CATALOGUE[e] for e in CASES[name].pair]))
-
-
-def poorly_logged(case: Case, machine: MachineModel, seed: int) -> tuple[Logs, Logs]:
-    """A log of the poor motion, and one held out."""
-    poor = simulate(machine, case.poor, seed=seed, simulator=ReducedSimulator)
-    held = simulate(machine, case.poor, seed=seed + 10, simulator=ReducedSimulator)
-    return {"poor": poor}, {"held": held}
-
-
-def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
-    machine = case.machine(truth)
+    case, machine = CASES[name], CASES[name].machine(truth)
+    catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
     # With some noises even this motion tells the two apart; where it does so half the time, six
     # logs in a row that do are one case in 64.
     for seed in range(1, 7):
-        poor, held = poorly_logged(case, machine, seed)
+        poor, held = logged(machine, case.poor, seed), logged(machine, case.poor, seed + 10)
         before = diagnose(case.stage, poor, held, catalogue=catalogue, test_function=WINDOW)
         if abs(separation(before.axes["x"].ranking)) < RULE.least_bic:
             break
@@ -130,19 +124,13 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
     found = before.next_experiments.get("x")
     if before.axes["x"].verdict is not Verdict.MISSING_EFFECTS:
         assert found is None
-        rivals = [CATALOGUE[e] for e in case.pair]
         found = plan(
-            case.stage,
-            poor,
-            between=rivals,
-            catalogue=catalogue,
-            duration=DURATION,
-            test_function=WINDOW,
-        )
+            case.stage, poor, between=list(catalogue.values()), catalogue=catalogue,
+            duration=DURATION, test_function=WINDOW,
+        )  # fmt: skip
     assert found.decides
     assert set(found.between) == set(case.pair)
-    new = {"new": simulate(machine, found.chosen.experiment, seed=3, simulator=ReducedSimulator)}
-    logs = {**poor, **new}
+    logs = {**poor, **logged(machine, found.chosen.experiment, 3)}
     after = diagnose(case.stage, logs, held, catalogue=catalogue, test_function=WINDOW).axes["x"]
     assert after.verdict is Verdict.MISSING_EFFECTS
     assert after.ranking[0].effect.name == truth
@@ -153,18 +141,12 @@ def assert_resolved(case: Case, truth: str, catalogue: Catalogue) -> None:
 @pytest.mark.parametrize(("name", "truth"), TRUTHS)
 def test_the_same_among_the_whole_catalogue(name, truth):
     machine, case = CASES[name].machine(truth), CASES[name]
-    poor, _ = poorly_logged(case, machine, 1)
+    poor = logged(machine, case.poor, 1)
     rivals = [CATALOGUE[e] for e in case.pair]
     found = plan(case.stage, poor, between=rivals, catalogue=CATALOGUE, test_function=WINDOW)
-    new = {
-        f"new {seed}": simulate(
-            machine, found.chosen.experiment, seed=seed, simulator=ReducedSimulator
-        )
-        for seed in (3, 4)
-    }
-    after = diagnose(case.stage, {**poor, **new}, catalogue=CATALOGUE, test_function=WINDOW).axes[
-        "x"
-    ]
+    logs = poor | logged(machine, found.chosen.experiment, 3)
+    logs |= logged(machine, found.chosen.experiment, 4)
+    after = diagnose(case.stage, logs, catalogue=CATALOGUE, test_function=WINDOW).axes["x"]
     ranks = [c.effect.name for c in after.ranking]
     (other,) = set(case.pair) - {truth}
     assert ranks.index(truth) < ranks.index(other)
@@ -174,10 +156,7 @@ def test_the_same_among_the_whole_catalogue(name, truth):
 def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     case = CASES["delay"]
     machine = case.machine("actuator_delay")
-    logs = [
-        {f"log {s}": simulate(machine, case.poor, seed=s, simulator=ReducedSimulator)}
-        for s in (1, 2)
-    ]
+    logs = [logged(machine, case.poor, seed) for seed in (1, 2)]
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])
     found = diagnose(case.stage, *logs, catalogue=catalogue, test_function=WINDOW)
     assert found.axes["x"].verdict is Verdict.MISSING_EFFECTS
@@ -187,14 +166,9 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     assert "rate of change of the motor force" in following["missing_motion"]
     assert following["expected_difference"] > 0.1 * following["noise_floor"]
     assert "passes" in diagnose_text(found)
-    card = next(s for s in sections_of(found) if s.anchor == "answer").blocks[0]
-    assert any("twin plan" in remark for remark in card.remarks)
-
-
-def sections_of(found):
-    """The sections of the report of a diagnosis."""
     subject = Subject("test", found, found.comparison, (), ())
-    return sections(subject)
+    card = next(s for s in sections(subject) if s.anchor == "answer").blocks[0]
+    assert any("twin plan" in remark for remark in card.remarks)
 
 
 @pytest.mark.slow
