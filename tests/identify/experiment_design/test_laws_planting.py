@@ -15,7 +15,6 @@ from constructed import (
 
 from identify.dataset.drive import reading_error
 from identify.dataset.motion import motion_of
-from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT, states_along
@@ -52,18 +51,16 @@ AXIS = AxisModel(
     "name", ["cogging", "cable_slab", "quadratic_drag", "encoder_delay", "encoder_quantization"]
 )
 def test_a_drawn_effect_has_the_force_that_was_asked(name):
-    bare = AxisModel(1.7)
+    bare, noise = AxisModel(1.7), name == "encoder_quantization"
     for force, seed in ((0.03, 1), (0.11, 2)):
-        found = draw_effect(
-            CATALOGUE[name], bare, LOGS, COVERED, force, np.random.default_rng(seed)
-        )
-        if name == "encoder_quantization":
+        rng = np.random.default_rng(seed)
+        found = draw_effect(CATALOGUE[name], bare, LOGS, COVERED, force, rng)
+        added = residual(bare.with_effect(found), LOGS) - residual(bare, LOGS)
+        if noise:
             alone = AxisModel(1.7, effects=(found,))
             parts = [1.7 * w.fine.acceleration(reading_error(alone, w.motion)[1]) for w in LOGS]
-            assert rms(np.concatenate(parts)) == pytest.approx(force, rel=0.05)
-            continue
-        added = residual(bare.with_effect(found), LOGS) - residual(bare, LOGS)
-        assert rms(added) == pytest.approx(force, rel=1e-3)
+            added = np.concatenate(parts)
+        assert rms(added) == pytest.approx(force, rel=0.05 if noise else 1e-3)
         np.testing.assert_allclose(added_force(found, bare, LOGS, residual(bare, LOGS)), added)
 
 
@@ -86,25 +83,27 @@ def test_beside_a_fit_only_what_its_parameters_cannot_take_over_counts():
 
 def test_strengths_are_scaled_in_their_direction_and_within_bounds():
     cable = CATALOGUE["cable_slab"]
-    norm = lambda f: np.array(list(f.values.values()))  # noqa: E731
-    alike = strength_for(cable, norm, 3.0)
-    np.testing.assert_allclose(norm(alike), 3.0, rtol=1e-6)
-    drawn = norm(strength_for(cable, norm, 3.0, None, np.random.default_rng(5)))
-    assert rms(drawn) == pytest.approx(3.0, rel=1e-6)
-    assert (drawn < 0.0).any()
-    assert (drawn > 0.0).any()
+
+    def all_of(fitted):
+        return np.array(list(fitted.values.values()))
+
+    def one(name, parameter, wanted, *more):
+        size = lambda fitted: np.array([fitted.values[parameter]])  # noqa: E731
+        return strength_for(CATALOGUE[name], size, wanted, *more).values
+
+    np.testing.assert_allclose(all_of(strength_for(cable, all_of, 3.0)), 3.0, rtol=1e-6)
+    signs = set()
     for seed in range(20):  # none is more than three times another
-        drawn = np.abs(norm(strength_for(cable, norm, 3.0, None, np.random.default_rng(seed))))
-        assert 1.0 / 3.0 < (drawn / drawn.max()).min() < 0.99
-    held_ = strength_for(CATALOGUE["cogging"], lambda f: np.array([f.values["a1"]]), 0.4, {
-        **CATALOGUE["cogging"].starts(), "p": 0.0371})  # fmt: skip
-    assert held_.values["p"] == 0.0371
-    assert held_.values["a1"] == pytest.approx(0.4)
-    most = strength_for(CATALOGUE["encoder_delay"], lambda f: np.array([f.values["tau"]]), 9.0)
-    assert most.values["tau"] == pytest.approx(6e-3)
-    friction = strength_for(CATALOGUE["stribeck"], lambda f: np.array([f.values["Fc"]]), 0.4, None,
-                            np.random.default_rng(1))  # fmt: skip
-    assert friction.values["Fs"] >= friction.values["Fc"] == pytest.approx(0.4)
+        drawn = all_of(strength_for(cable, all_of, 3.0, None, np.random.default_rng(seed)))
+        assert rms(drawn) == pytest.approx(3.0, rel=1e-6)
+        assert 1.0 / 3.0 < np.abs(drawn).min() / np.abs(drawn).max() < 0.99
+        signs |= {*np.sign(drawn)}
+    assert signs == {-1.0, 1.0}
+    held = one("cogging", "a1", 0.4, {**CATALOGUE["cogging"].starts(), "p": 0.0371})
+    assert (held["p"], held["a1"]) == (0.0371, pytest.approx(0.4))
+    assert one("encoder_delay", "tau", 9.0)["tau"] == pytest.approx(6e-3)
+    friction = one("stribeck", "Fc", 0.4, None, np.random.default_rng(1))
+    assert friction["Fs"] >= friction["Fc"] == pytest.approx(0.4)
 
 
 def test_another_machine_has_each_value_within_a_fifth_and_the_same_mass():
@@ -135,28 +134,14 @@ RATE = 2000.0
 T = np.arange(round(1.7 * RATE)) / RATE
 
 
-def prepared(x, force, other=None, pushes=None) -> dict[str, PreparedLog]:
-    """The log prepared for its axes; readings may lack the last sample, of which no force is known.
-
-    pushes: of the other axis.
-    """
-    log = log_of(RATE, x, force, other)
-    if pushes is not None:
-        log.axes["y"].columns["force"][:] = pushes
-    return {a: windowed(motion_of(log, a, "log")) for a in log.axes if np.ptp(log.axes[a].position)}
-
-
 @pytest.mark.parametrize("simulator", [ReducedSimulator, MujocoSimulator])
 def test_an_axis_that_stands_still_is_seen_where_it_stands(simulator):
     """A friction that grows with the place of the other axis: of 0.3 N at 0.1 m and 10/m, 0.6."""
     brush = effect("dahl", {"Fc": 0.3, "sigma0": 4e3})
     axis = AxisModel(1.7, effects=(brush, effect("load_dependent_friction", {"offset": 10.0})))
-    t = np.arange(len(T)) / RATE
-    x = 0.1 * np.sin(3.0 * t + 0.1)
-    middle = 0.1 * np.sin(3.0 * (t + 0.5 / RATE) + 0.1), 0.3 * np.cos(3.0 * (t + 0.5 / RATE) + 0.1)
-    force = -0.9 * 1.7 * 10.0 * middle[0] + 0.6 * np.sign(middle[1])
-    log = prepared(x, force, np.full(len(t), 0.1))
-    assert list(log) == ["x"]
+    x, phase = 0.1 * np.sin(3.0 * T + 0.1), 3.0 * (T + 0.5 / RATE) + 0.1
+    force = -0.9 * 1.7 * 10.0 * 0.1 * np.sin(phase) + 0.6 * np.sign(np.cos(phase))
+    log = {"x": windowed(motion_of(log_of(RATE, x, force, np.full(len(T), 0.1)), "x", "log"))}
     model = MachineModel("s", {"x": axis, "y": AxisModel(2.0, effects=(effect("dahl"),))})
     run = free_run(model, log, simulator)
     blind = free_run(MachineModel("s", {"x": axis}), log, simulator)
@@ -164,14 +149,20 @@ def test_an_axis_that_stands_still_is_seen_where_it_stands(simulator):
     assert np.abs(run.error["x"][first]).max() < 0.1 * np.abs(blind.error["x"][first]).max()
 
 
+def states_of(axis, x, starts, command=None):
+    """The table of two such axes, and their states at the starts along positions (n, 2) m."""
+    table = MachineModel("s", {"x": axis, "y": axis}).table()
+    given = 0.0 * x if command is None else command
+    return table, states_along(table, x, given, 1.0 / RATE, starts, 0.0)
+
+
 def test_states_at_a_restart_are_those_of_the_motion_before_it():
     """A lag is where its step response is; that of each axis in its own states."""
     x = np.stack([0.1 * T, -0.2 * T[::-1]], axis=1)
     command = np.stack([3.0 * (T >= 0.5), np.full(len(T), -5.0)], axis=1)
     axis = AxisModel(1.0, effects=(effect("actuator_lag", {"tau": 0.03}),))
-    table = MachineModel("s", {"x": axis, "y": axis}).table()
     starts = np.array([800, 1100, 1700])
-    states = states_along(table, x, command, 1.0 / RATE, starts, 0.0)
+    table, states = states_of(axis, x, starts, command)
     own = states[:, table.entries[:, 3].astype(int)].T
     since = starts / RATE - 0.5
     wanted = np.where(since > 0.0, 3.0 * (1.0 - np.exp(-since / 0.03)), 0.0)
@@ -183,12 +174,12 @@ def test_a_coupled_axis_follows_the_others_motion_before_a_restart():
     """A cable dragged by one axis alone is bent on it, and on no other."""
     x = np.stack([0.1 * np.sin(9.0 * T), 0.03 + 0.0 * T], axis=1)
     axis = AxisModel(1.0, effects=(effect("cable_hysteresis", {"f0": 0.4}),))
-    table = MachineModel("s", {"x": axis, "y": axis}).table()
-    states = states_along(table, x, 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    starts = np.array([900, 1900])
+    table, states = states_of(axis, x, starts)
     first, second = (slice(int(e[3]), int(e[3]) + 4) for e in table.entries)
     assert np.abs(states[:, first]).max() > 1e-4
     assert not states[:, second].any()
-    swapped = states_along(table, x[:, ::-1], 0.0 * x, 1.0 / RATE, np.array([900, 1900]), 0.0)
+    _, swapped = states_of(axis, x[:, ::-1], starts)
     np.testing.assert_array_equal(swapped[:, second], states[:, first])
 
 
@@ -199,23 +190,21 @@ def test_friction_before_a_restart_knows_the_place_and_the_other_axis():
     place = effect("position_dependent_friction", {"c1": 0.3, "c2": 0.2})
     load = effect("load_dependent_friction", {"motor": 0.0, "corner": 1.7, "offset": 0.9})
     axis = AxisModel(1.0, effects=(brush, place, load))
-    table = MachineModel("s", {"x": axis, "y": axis}).table()
     starts = np.array([900, 2100, 3000])
-    states = states_along(table, x, 0.0 * x, 1.0 / RATE, starts, 0.0)
+    table, states = states_of(axis, x, starts)
+    alone = axis_table({"x": axis})
+    first, last, begin, *_ = alone.axes[0]
     for a in (0, 1):
-        own = next(e for e, n in zip(table.entries, table.labels, strict=True)
-                   if n == ("xy"[a], "dahl"))  # fmt: skip
-        table_of_one = axis_table({"x": axis})
+        label = ("xy"[a], "dahl")
+        own = int(table.entries[table.labels.index(label), 3])
         steady = []
         for k in starts:
             at = np.stack([np.full(200, 0.5 * (x[k, i] + x[k - 1, i])) for i in (a, 1 - a)])
             motion = np.stack([at[0], np.full(200, (x[k, a] - x[k - 1, a]) * RATE), 0.0 * at[0]])
             other = np.stack([at[1], 0.0 * at[1], 0.0 * at[1]])
-            memory = np.zeros(table_of_one.n_states)
-            first, last, begin, _, _ = table_of_one.axes[0]
-            rows = np.zeros((len(table_of_one.entries), 200))
-            walk(table_of_one.entries, first, last, table_of_one.parameters, memory, begin,
+            rows = np.zeros((len(alone.entries), 200))
+            walk(alone.entries, first, last, alone.parameters, np.zeros(alone.n_states), begin,
                  motion, other, 1.0 / RATE, 0, rows)  # fmt: skip
             steady.append(-rows.sum(axis=0)[-1])
-        np.testing.assert_allclose(states[:, int(own[3])], steady, rtol=5e-3)
+        np.testing.assert_allclose(states[:, own], steady, rtol=5e-3)
         assert np.ptp(steady) > 0.02
