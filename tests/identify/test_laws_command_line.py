@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from strict_json import strict, valid
 from identify import workflow
 from identify.output import as_json
 from identify.output import text as as_text
+from identify.output.words.commands import Source
 from twin.effects import load_catalogue
 from twin.experiments.file import load_experiment
 from twin.experiments.named import simulate
@@ -24,6 +26,7 @@ from twin.model.machine import MachineModel
 OWN = Path(__file__).parents[2] / "examples" / "my_effect.py"
 HELD, TESTED = ("--holdout", "b.mcap"), ("--test", "c.mcap")
 COMMON = ("--test-function", "0.07")
+TYPED = (*COMMON, "--effects", str(OWN))  # that the next command needs as well
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +89,8 @@ def test_a_command_tells_and_writes_what_its_call_gives(folder, name):
     assert done.returncode == 0, done.stderr
     assert (folder / out).is_file()
     text = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, folder=folder).stdout
-    assert text.startswith(getattr(as_text, f"{name}_text")(found))
+    source = () if name != "diagnose" else (Source(model="m.toml", options=shlex.join(TYPED)),)
+    assert text.startswith(getattr(as_text, f"{name}_text")(found, *source))
     if name in ("fit", "add"):
         again = load_model(folder / out, load_catalogue())
         assert again.axes["x"].names == found.model.axes["x"].names

@@ -28,7 +28,10 @@ from twin.simulator import ReducedSimulator
 STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=2000.0)
 PULLED = STAGE.with_axis("x", STAGE.axes["x"].with_effect(effect("quadratic_drag", {"c": 30.0})))
 KNOWN = Catalogue([CATALOGUE["quadratic_drag"], CATALOGUE["constant_force"]])
-TESTED = {"test_error_before", "test_error_after", "test_error_on", "explains", "noise_floors"}
+TESTED = {
+    "test_error_before", "test_error_after", "test_error_on", "explains", "explained",
+    "noise_floors",
+}  # fmt: skip
 
 
 def logged(seed: int, seconds: float = 4.0) -> Log:
