@@ -51,7 +51,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.logs import GivenLogs, Log, logs_by_name
-from twin.memory import give_back
+from twin.memory import trim_memory
 from twin.model.file import as_model
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
@@ -115,7 +115,7 @@ def fit(
     for axis, result in fits.items():
         model = model.with_axis(axis, result.axis)
         model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
-    give_back()
+    trim_memory()
     return FitResult(model, found, fits, intervals, held, tested, given, refits)
 
 

@@ -10,7 +10,7 @@ SMALLEST_MAPPED = 1 << 23  # bytes; a signal of a log is smaller, an array of se
 MOST_KEPT = 1 << 25  # bytes at the end of that place
 
 
-def share() -> None:
+def share_one_arena() -> None:
     """Let the threads of a program take memory from one place, where the C library is glibc.
 
     It would keep what each of them has freed for that thread alone, and take the next signal from
@@ -23,7 +23,7 @@ def share() -> None:
         libc.mallopt(M_TRIM_THRESHOLD, MOST_KEPT)
 
 
-def give_back() -> None:
+def trim_memory() -> None:
     """Give back what was freed, where the C library keeps it for itself, as glibc does.
 
     Behind a step that took much for a while: a process that goes on needs it only in part.

@@ -165,9 +165,9 @@ def with_logs(
     Also the findings on the first logs, and which of any role were left out, and why. refused:
     names of the faults with which one of the first is refused.
     """
-    from twin.memory import share
+    from twin.memory import share_one_arena
 
-    share()
+    share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]
     recorded = CheckedRecordings(logs or (), every, refused)
     rest = (Recordings(paths or (), every) for paths in others)

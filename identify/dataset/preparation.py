@@ -29,7 +29,7 @@ from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
 from twin.logs import Log
-from twin.memory import give_back
+from twin.memory import trim_memory
 from twin.model.machine import MachineModel
 from twin.parallel import spread
 
@@ -57,7 +57,7 @@ def datasets(
     training = given[Role.TRAINING].values()
     require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
     out = _prepared(model, given, test_function)
-    give_back()
+    trim_memory()
     return out
 
 

@@ -35,7 +35,7 @@ from identify.selection.trying import (
 )
 from twin.effect import Kind
 from twin.effects import Catalogue
-from twin.memory import give_back
+from twin.memory import trim_memory
 from twin.progress import Progress, silent, within
 
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
@@ -109,7 +109,7 @@ def _forget(found: Found) -> None:
     for fit in (*fits, *(c.fit for c in found.ranking)):
         fit.forget()
     Trial.beside.cache_clear()
-    give_back()
+    trim_memory()
 
 
 def _begun(base: Fit, dataset: Dataset) -> Found:

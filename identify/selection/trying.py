@@ -34,7 +34,7 @@ from identify.selection.curves import shapes_of
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.memory import give_back
+from twin.memory import trim_memory
 from twin.model.machine import AxisModel
 from twin.parallel import spread
 from twin.progress import Progress, silent
@@ -85,7 +85,7 @@ def tried_beside(
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
         tried += _refitted(judged, best, len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
-    give_back()
+    trim_memory()
     noise = [as_noise(judged, e) for e in effects if is_noise(e)]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]

@@ -163,7 +163,7 @@ def position_errors(
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """Of one log what was measured, what the model says and what is left, on one clock.
+    """Of one log what was measured, what the model says and what is left, at the same samples.
 
     sample_rate: Hz; topics: "/measured/x" -> column -> (n,) in units of the axis. The position of
     the model is that of the free run; its force is averaged by test functions. units: by axis.

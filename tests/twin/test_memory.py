@@ -13,10 +13,10 @@ THREADS = 4
 # Heaps of the C library while threads that have taken and freed memory are still there.
 HEAPS = f"""
 import ctypes, sys, threading
-from twin.memory import share
+from twin.memory import share_one_arena
 
 if sys.argv[1] == "shared":
-    share()
+    share_one_arena()
 libc = ctypes.CDLL(None)
 libc.malloc.restype = libc.fopen.restype = ctypes.c_void_p
 ready, asked = threading.Barrier({THREADS + 1}), threading.Event()
