@@ -154,15 +154,15 @@ def test_what_hardly_moves_or_is_too_slow_has_no_record():
     assert arena(FIRST, test_function=0.0081).record(FIRST, Tracking(2.0)).period == moved.period
     with pytest.raises(CannotRun, match="too slowly"):
         arena(FIRST, test_function=0.0079).record(FIRST, Tracking(2.0))
-    with pytest.raises(CannotRun, match=r"hardly moves, or for less than 1 s"):
-        arena(FIRST).record(FIRST, Tracking(0.9))
+    with pytest.raises(CannotRun, match=r"hardly moves, or for less than 0.5 s"):
+        arena(FIRST).record(FIRST, Tracking(0.4))
     resting = Passes("x", 1e-9, 1e-9, 1)
     with pytest.raises(CannotRun, match="hardly moves"):
         arena(FIRST).record(FIRST, resting)
 
 
 def test_trials_come_by_falling_gain_and_those_that_cannot_run_apart():
-    tried, bars = [Tracking(2.0), Tracking(0.9), Tracking(4.0)], []
+    tried, bars = [Tracking(2.0), Tracking(0.4), Tracking(4.0)], []
     found, not_run = contest(arena(FIRST, SECOND), tried, lambda *done: bars.append(done[1:]))
     assert [t.experiment for t in not_run] == tried[1:2]
     gains = {t.experiment: t.gain for t in found}
@@ -185,7 +185,7 @@ def test_a_refit_judges_by_the_truth_that_is_told_worst():
     assert found.gain == pytest.approx(min(gains))
     assert found.gain != pytest.approx(max(gains))
     assert refitted(arena(FIRST), trial) is trial
-    short = refitted(arena(FIRST, SECOND), replace(trial, experiment=Tracking(0.9)))
+    short = refitted(arena(FIRST, SECOND), replace(trial, experiment=Tracking(0.4)))
     assert (short.gain, short.difference, short.not_run.truth) == (0.0, 0.0, "one")
     assert "hardly moves" in short.not_run.reason
 
