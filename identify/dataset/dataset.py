@@ -112,7 +112,11 @@ class Dataset:
         return self._shortened(ENOUGH)
 
     def _shortened(self, seconds: float) -> Dataset:
-        if all(sum(map(_length, logs)) <= seconds for logs in (self.fit, self.holdout)):
+        # A beginning is whole blocks, and may be longer by half a one.
+        lengths = (
+            (_length(w) - w.motion.period for w in logs) for logs in (self.fit, self.holdout)
+        )
+        if all(sum(own) <= seconds for own in lengths):
             return self
 
         def cut(logs: tuple[PreparedLog, ...]) -> tuple[PreparedLog, ...]:

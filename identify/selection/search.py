@@ -93,7 +93,8 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
     base.forget()  # of all of the logs; it is asked for them when the search has ended
-    found = _search(_begun(fit_axis(base.axis, part.fit), part), catalogue, progress)
+    begun = replace(fit_axis(base.axis, part.fit), begun=base.begun)
+    found = _search(_begun(begun, part), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
     _forget(found)
     whole = _on_whole(found, base, dataset)

@@ -290,3 +290,12 @@ def test_a_test_function_is_above_zero_and_shorter_than_the_logs(length):
         InputError, match="s: give a length above 0 s and below that of the data, 4 s"
     ):
         datasets(PLAIN, {"a": logged(STAGE, seconds=4.0)}, {}, length)
+
+
+def test_the_beginnings_of_long_logs_are_their_own_beginnings():
+    """Also where 30 s are no whole number of samples, and a beginning is a little longer."""
+    t = np.arange(27_000) / 610.36
+    log = log_of(610.36, np.sin(3.0 * t) + 0.3 * np.sin(11.0 * t), -9.0 * np.sin(3.0 * t))
+    whole = datasets(PLAIN, {"l": log}, {})["x"]
+    assert len(whole.part.fit[0]) < len(whole.fit[0])
+    assert whole.part.part is whole.part
