@@ -22,7 +22,6 @@ from twin.signals import between, local_parabola
 Array = NDArray[np.float64]
 
 LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
-KEPT = 8  # true motions of logs, and as many actual forces
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -42,7 +41,7 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     return _behind_command(_Valued.of(part), motion) if part.effects else motion.raw[1]
 
 
-@lru_cache(maxsize=KEPT)  # while a fit moves other parameters, the actual force stays
+@lru_cache(maxsize=8)  # while a fit moves other parameters, the actual force stays
 def _behind_command(actuation: _Valued, motion: Motion) -> Array:
     fine = motion.at_samples(0.5)
     return motion.raw[1] + _added(actuation.axis, motion, fine, motion.sample_period)
@@ -104,7 +103,7 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     return _behind(_Valued.of(replace(axis, effects=tuple(sensing))), motion)
 
 
-@lru_cache(maxsize=KEPT)  # while a fit moves other parameters, the true motion stays
+@lru_cache(maxsize=8)  # while a fit moves other parameters, the true motion stays
 def _behind(sensing: _Valued, motion: Motion) -> tuple[Motion, Array]:
     error, rate = reading_error(sensing.axis, motion)
     blocks = motion.signals.copy()

@@ -22,6 +22,7 @@ from identify.dataset.readings import (
     rounding,
     together,
 )
+from identify.dataset.test_function import LEAST_BLOCKS
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR, MachineModel
@@ -33,11 +34,8 @@ SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 
 SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
-SPEED_NOISE = 1e-3  # velocity noise allowed, as a part of the highest speed
+REST_SPEED = 1e-3  # of the highest; below, an axis may stick, and no velocity need be known better
 SHORTEST_LOG = 0.5  # s, a few test functions
-FEWEST_SAMPLES = 64  # of a log; more than those of 1 s where they are slow
-EQUAL = 1e-9  # relative difference by which whole samples may miss a length
-FOLLOWS = 0.5  # squared correlation of position and setpoint from which the loop is closed
 OF_JOINT = 0.02  # s, over which a joint's position is a parabola that tells its velocity
 
 
@@ -286,7 +284,7 @@ def motion_of(
     if axis not in log.axes:
         raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
     readings = log.axes[axis].position
-    least = max(SHORTEST_LOG, FEWEST_SAMPLES * log.period)
+    least = max(SHORTEST_LOG, LEAST_BLOCKS**2 * log.period)
     if len(log) * log.period < least:
         raise InputError(
             f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
@@ -333,7 +331,7 @@ def _follows(signals: AxisLog) -> bool | None:
     wanted, position = signals.columns["setpoint_position"], signals.position
     if np.ptp(wanted) == 0.0 or np.ptp(position) == 0.0:
         return False
-    return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > FOLLOWS)
+    return bool(np.corrcoef(wanted, position)[0, 1] ** 2 > 0.5)
 
 
 def other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
@@ -354,8 +352,8 @@ def _block_samples(position: Array, noise: float, period: float, longest: float)
     """Samples a block: 1 ms, or as long as the encoder's noise asks for, up to a length (s)."""
     span = max(round(SHORTEST_BLOCK / period), 1)
     fastest = np.abs(position[span:] - position[:-span]).max() / (span * period)
-    quiet = np.sqrt(2.0) * noise / (SPEED_NOISE * fastest)
-    most = int(longest / period * (1.0 + EQUAL))
+    quiet = np.sqrt(2.0) * noise / (REST_SPEED * fastest)
+    most = int(longest / period * (1.0 + 8.0 * np.finfo(float).eps))
     return max(min(round(max(SHORTEST_BLOCK, quiet) / period), most), 1)
 
 

@@ -35,7 +35,6 @@ from twin.signals import Array, between, local_parabola
 
 SCATTER = 0.1  # of a part's RMS, by which its estimate misses it; see tests of the noise floor
 OF_ROUNDING = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
-SURE = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)  # standard errors to the floor's ends
 PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
 HARMONICS = 8  # that hold 93 % of the power; others are taken as white
 WIDEST = 501  # samples that tell a speed to a 10^-4 of a step a sample; more would take time
@@ -140,7 +139,8 @@ def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noi
     errors = dict.fromkeys(parts, SCATTER) | {"rounding": OF_ROUNDING}
     errors["aliasing"] += 0.5 * max(n.scatter for n in noises)
     power = sum(size**2 for size in parts.values())
-    scatter = SURE * np.sqrt(sum((2.0 * errors[k] * v**2) ** 2 for k, v in parts.items()))
+    sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)
+    scatter = sure * np.sqrt(sum((2.0 * errors[k] * v**2) ** 2 for k, v in parts.items()))
     low = np.sqrt(max(power - scatter, 0.0))
     high = np.sqrt(power + scatter + (0.0 if told else rounds**2))
     return NoiseFloor(float(np.sqrt(power)), float(low), float(high), parts)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import parts_of
-from identify.dataset.motion import Motion
+from identify.dataset.motion import REST_SPEED, Motion
 from identify.dataset.test_function import TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 
 Reach = tuple[float, float]  # lowest and highest position, m
 EVERYWHERE: Reach = (-np.inf, np.inf)
-REST_SPEED = 1e-3  # of the highest speed; below it the force of a friction that sticks is unknown
 
 
 @dataclass(frozen=True, eq=False, repr=False)

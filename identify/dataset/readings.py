@@ -15,7 +15,13 @@ from statistics import NormalDist
 
 import numpy as np
 
-from identify.dataset.spectrum import Record, fitted_levels, median_spectrum, strongest_line
+from identify.dataset.spectrum import (
+    MOST_LINES,
+    Record,
+    fitted_levels,
+    median_spectrum,
+    strongest_line,
+)
 from identify.dataset.test_function import LOOK, TestFunction
 from identify.rules import RULE
 from twin.logs import Log
@@ -25,7 +31,6 @@ ENOUGH = 200_000  # samples, whose noise tells that of all
 GATHERED = 0.5  # mean cosine of differences in turns of a step; 0 where they do not gather
 FEWEST = 0.01  # of the samples, at which a reading must change to tell a step
 BINS = 4096  # of differences, in the first three multiples of the coarsest step
-MOST_RIPPLES = 6
 LEAST = 0.01  # share of the differences' variance that a line takes; a weaker one makes no noise
 OUTLIER = 20.0  # times the usual size, to which larger differences are cut
 FINEST_CYCLES = 1 << 18  # over the travel
@@ -135,7 +140,7 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
         return ()
     finest = min(FINEST_CYCLES / span, 0.5 / step if step else np.inf)
     found: list[float] = []
-    for _ in range(MOST_RIPPLES):
+    for _ in range(MOST_LINES):
         frequency, share = strongest_line(Record(place, bend), RULE.fewest_cycles / span, finest)
         if share < LEAST:
             break

@@ -30,7 +30,6 @@ MOST_LINES = 24
 CELLS_A_PERIOD = 4  # of the highest frequency, where samples are not equally spaced
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 BAND = 20  # resolutions whose median tells the level of the spectrum
-LEVEL_FREEDOM = 30.0  # independent powers that the median of so many correlated ones is worth
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
 ROUNDS = 12  # of least squares, after which levels rest
@@ -340,7 +339,7 @@ def _false_alarm(height: float, records: int, tried: int) -> float:
     height: power over the level around, summed over records; as both are estimated, it follows the
     F distribution, whose tail is a finite sum where one of its freedoms is even.
     """
-    freedom = LEVEL_FREEDOM * records
+    freedom = 1.5 * BAND * records  # a median of three bands is worth half of their powers
     tiny, eps = np.finfo(float).tiny, np.finfo(float).eps
     part = min(max(height / (freedom + height), tiny), 1.0 - eps)
     logs = (
