@@ -139,14 +139,17 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined
+    from identify.analysis.joint_signs import misassigned
     from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
     from twin.model.file import read_mjcf, save_model
 
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
-    model = first_model(dict(recorded), out.stem, load_catalogue(), bodies)
+    read = dict(recorded)
+    model = first_model(read, out.stem, load_catalogue(), bodies)
     save_model(model, out)
+    doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
     notes = [
         f"axis {axis}: {label} is not determined, as the axis does not break away from rest by "
@@ -156,7 +159,8 @@ def new(
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
-    return Said("\n".join([text, *notes]), answer, recorded.findings)
+    doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
+    return Said("\n".join([text, *notes]), answer, [*recorded.findings, *doubts])
 
 
 @app.command()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, friction
+from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, arm_of, friction
 from cli_runs import refusal, twin
 
+from identify.analysis.joint_signs import misassigned
 from identify.estimation.open_loop import open_loop
 from identify.workflow import compare, diagnose, fit
 from twin.effects import load_catalogue
-from twin.logs import write_log
+from twin.logs import read_log, write_log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
@@ -41,6 +42,29 @@ def test_planted_friction_is_found(folder):
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
         assert found.fits[joint].ratio < 1.5
         assert found.datasets[joint].channel_delay == 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda p, f: (p, f), None),
+        (
+            lambda p, f: (p * [1, 1, -1], f * [1, 1, -1]),
+            "axis elbow: with the other sign of its position and torque",
+        ),
+        (
+            lambda p, f: (p * [1, -1, 1], f),
+            "axis shoulder: with the other sign of its position (sign",
+        ),
+        (lambda p, f: (p[:, [0, 2, 1]], f[:, [0, 2, 1]]), "axes shoulder and elbow: exchanged"),
+    ],
+)
+def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
+    log = read_log(folder / "1.mcap")
+    signals = ([log.axes[j].columns[n] for j in JOINTS] for n in ("position", "force"))
+    changed = arm_of(*change(*(np.transpose(columns) for columns in signals)))
+    told = misassigned(load_model(folder / "arm.toml"), changed)
+    assert told is None if said is None else told is not None and said in told
 
 
 def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder):
