@@ -37,7 +37,7 @@ from identify.rules import RULE
 Array = NDArray[np.float64]
 
 RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
-TINY = 1e-300  # N^2, of a residual that is nothing
+TINY = np.finfo(float).tiny  # N^2, of a residual that is nothing
 
 
 @dataclass(frozen=True)

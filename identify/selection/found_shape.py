@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 
@@ -13,12 +14,13 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.splines import Linearised, solve
+from identify.rules import RULE
 from identify.selection.curves import Shape, sticking
 from twin.curve import Coordinate
 from twin.model.units import LINEAR
 from twin.signals import Array
 
-BAND = 1.645  # standard deviations, 90 %
+BAND = NormalDist().inv_cdf(1.0 - RULE.chance)  # standard deviations, to each side
 UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
 SELDOM = 0.02  # of the most visited knot's weight, below which a knot is not drawn
