@@ -1,7 +1,5 @@
 """The noise floor told before a fit, against what the true model leaves, and its parts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from machines import one_axis
@@ -66,17 +64,6 @@ def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     assert blind.parts["rounding"] == 0.0
     assert knowing.parts["rounding"] > 0.5 * blind.value
     assert blind.high > knowing.value
-
-
-def test_a_floor_is_below_what_is_left_and_keeps_its_parts():
-    fit = workflow.fit(STAGE, {"log": log_of("every 5th")}, test_function=0.1).fits["x"]
-    floor = noise_beside(fit.axis, fit.logs)
-    less = floor.at_most(0.9 * floor.value)
-    assert less.value == pytest.approx(0.9 * floor.value)
-    assert less.parts["aliasing"] == pytest.approx(0.9 * floor.parts["aliasing"])
-    assert floor.at_most(2.0 * floor.value) is floor
-    loud = tuple(replace(log, force_noise=floor.value) for log in fit.logs)
-    assert noise_beside(fit.axis, loud).parts["force"] == pytest.approx(floor.value)
 
 
 def test_the_coherence_of_a_dip_is_found_and_independent_noises_have_none():

@@ -89,17 +89,6 @@ def test_a_force_in_sharpened_windows_is_the_acceleration_of_the_readings(parts)
     assert errors[1][1] < 0.1 * errors[1][0]
 
 
-def test_the_response_is_what_passes_of_a_sine():
-    window = TestFunction.of_length(0.02, 1e-3)
-    samples = window.refined(4)
-    for segment in (400, 50):
-        found = window.response(2.5e-4, segment)
-        frequency = np.fft.rfftfreq(segment, 2.5e-4)
-        assert found.shape == frequency.shape
-        turn = np.exp(2j * np.pi * np.outer(frequency, np.arange(80)) * 2.5e-4)
-        np.testing.assert_allclose(found, np.abs(turn @ samples.weights) ** 2, atol=1e-12)
-
-
 # --- motions ------------------------------------------------------------------------------------
 
 

@@ -8,7 +8,6 @@ import pytest
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Motion
 from identify.dataset.noise import noise_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
@@ -24,47 +23,6 @@ CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
 STEP = 2.3e-7  # m
 DT = 1e-4  # s
-
-
-def moved(readings) -> Motion:
-    """A motion with these readings (n + 1,) m."""
-    n = len(readings) - 1
-    block = readings[1 : n // 10 * 10 + 1].reshape(-1, 10).mean(axis=1)
-    signals = np.stack([block, np.gradient(block, 10 * DT), np.zeros(len(block))])
-    raw = np.stack([np.diff(readings) / DT, np.zeros(n)])
-    return Motion("a log", "x", signals, np.zeros_like(signals), 10 * DT, 5 * DT, DT, 0.0, raw)
-
-
-def path(n: int = 40_001):
-    """A slow and fast motion, (n,) m."""
-    return 2e-3 * np.sin(2.0 * np.pi * 0.5 * DT * np.arange(n)) ** 3
-
-
-def rounded(x, step: float):
-    return step * np.rint(x / step)
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-9, 3e-7], ids=["none", "after", "before"])
-def test_the_step_is_read_off_the_readings(noise):
-    drawn = np.random.default_rng(1).standard_normal(40_001)
-    before = rounded(path() + (noise if noise > 1e-8 else 0.0) * drawn, STEP)
-    after = rounded(before + (noise if noise < 1e-8 else 0.0) * drawn, 1e-9)
-    assert moved(after).resolution == pytest.approx(STEP, rel=1e-3)
-
-
-def test_noise_without_rounding_has_no_step():
-    noise = 1e-8 * np.random.default_rng(1).standard_normal(40_001)
-    assert moved(path() + noise).resolution == 0.0
-    assert not moved(path() + noise).rounding.any()
-
-
-def test_what_rounding_did_is_taken_back_between_slow_steps():
-    turn = 2.0 * np.pi * DT * np.arange(40_001)
-    readings = rounded(3e-5 * np.sin(turn), STEP)
-    true = readings - 3e-5 * np.sin(turn)
-    away = np.abs(np.cos(turn)) > 0.3  # at a reversal nothing tells how far it went
-    left = (moved(readings).rounding - true)[away]
-    assert np.std(left) < 0.15 * np.std(true)
 
 
 @cache

@@ -93,10 +93,7 @@ def test_where_no_log_is_left_it_is_an_error_of_one_line():
 
 
 COMMANDS = (
-    ("fit", "m.toml", "run.mcap", "--holdout", "hops.mcap"),
-    ("fit", "m.toml", "run.mcap", "--test", "still.mcap"),
     ("compare", "m.toml", "run.mcap", "hops.mcap"),
-    ("add", "quadratic_drag", "m.toml", "run.mcap", "--holdout", "hops.mcap", "-o", "o.toml"),
     ("add", "quadratic_drag", "m.toml", "run.mcap", "--test", "hops.mcap", "-o", "o.toml"),
     ("diagnose", "m.toml", "run.mcap", "--holdout", "hops.mcap", "--test", "still.mcap"),
 )

@@ -10,7 +10,7 @@ from identify.analysis.first_model import first_model
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.test_function import LEAST_BLOCKS
-from identify.dataset.time_scale import FOREIGN, HELD, QUIET, SHOWS, Scale, beginnings
+from identify.dataset.time_scale import FOREIGN, HELD, Scale, beginnings
 from identify.output.words.fit import prepared_in_words
 from identify.workflow import compare, fit
 from twin.errors import InputError
@@ -42,25 +42,6 @@ def test_what_a_quiet_length_averages_away_asks_for_a_shorter_one():
     short, long = (Scale.of(length, [motion]) for length in (fast, still))
     assert short.shows_more_than(long)
     assert not long.shows_more_than(short)
-
-
-@pytest.mark.parametrize(
-    ("left", "floor", "shows"),
-    [
-        (SHOWS * 1.01, 1.0, True),
-        (SHOWS * 0.99, 1.0, False),
-    ],
-)
-def test_a_shorter_length_must_show_a_force_beside_its_noise(left, floor, shows):
-    assert Scale(0.02, left, floor).shows_more_than(Scale(0.2, 0.1, 0.1)) is shows
-
-
-@pytest.mark.parametrize(("part", "shows"), [(0.99, True), (1.01, False)])
-def test_and_the_quiet_one_must_hide_it(part, shows):
-    short = Scale(0.02, 5.0, 1.0)
-    seen = part * short.structure / SHOWS
-    assert short.shows_more_than(Scale(0.2, float(np.hypot(seen, 0.3)), 0.3)) is shows
-    assert QUIET < 1.0 / SHOWS  # what is quiet needs no shorter one
 
 
 def test_a_beginning_in_which_a_force_moves_nothing_is_left_out():
