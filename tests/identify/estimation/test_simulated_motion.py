@@ -22,6 +22,7 @@ from identify.estimation.open_loop import (
 )
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion, rough_minimum
 from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
+from twin.core.native import AXIS_STATES
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
@@ -97,7 +98,7 @@ def test_the_error_is_the_simulated_motion_less_the_measured_one(slide, log) -> 
     """Without friction a held force gives a parabola, sample by sample."""
     free = AxisModel(mass=5.0)
     part = prepared(slide, log)[0]
-    begun = Beginning(5, 0.01, 0.2, np.zeros(3))
+    begun = Beginning(5, 0.01, 0.2, np.zeros(AXIS_STATES))
     error = motion_error(free, part, begun)
     force = part.motion.raw[1][5:]
     velocity = 0.2 + np.concatenate([[0.0], np.cumsum(force[:-1] / 5.0 / RATE)])
