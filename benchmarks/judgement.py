@@ -11,7 +11,7 @@ from typing import Any
 
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
-from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.alignment import fit_aligned
 from identify.estimation.fit import Fit, error_if_any
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis

@@ -51,13 +51,19 @@ class DecisionRule:
     """Part of the squared residual from which it is the period of a dependence."""
 
     least_fall: float = 0.1
-    """Part of the squared error that a channel delay must remove."""
+    """Part of the squared error below which a fall is hardly one: by a channel delay, between two
+    turns of a fit whose priors are weighed by the error, of a force that is foretold."""
 
     least_shift: float = 0.05
     """Samples; less is no channel delay."""
 
     most_shift: float = 3.0
     """Samples; more is a fault of the log that its check finds."""
+
+    @property
+    def fallen(self) -> float:
+        """Part of an RMS error up to which it has fallen by more than is hardly anything."""
+        return float((1.0 - self.least_fall) ** 0.5)
 
 
 RULE = DecisionRule()

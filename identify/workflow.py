@@ -16,7 +16,7 @@ from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import sticks
-from identify.estimation.channel_delay import aligned, fit_aligned
+from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual

@@ -20,7 +20,7 @@ from benchmarks.selftest.machines import (
     prepared,
 )
 from identify.dataset.dataset import Dataset, Role
-from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.alignment import fit_aligned
 from identify.estimation.fit import Fit, error_in
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths

@@ -1,4 +1,4 @@
 """What logs tell without a diagnosis: a first model, friction by speed, the force of the cable.
 
-And the dynamic part of a friction from open-loop logs, and a twin that follows a machine's log.
+And the dynamic part of a friction from open-loop logs.
 """

@@ -19,7 +19,7 @@ from identify.analysis.velocity_map import only_axis
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.least_squares import minimise
+from identify.estimation.least_squares import MOST_EVALUATIONS, minimise
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from twin.effect import Kind
 from twin.errors import InputError
@@ -31,7 +31,6 @@ from twin.signals import Array
 PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
 HEAD = 3.0  # s of each log, on which the start is chosen
 FIRST_EVALUATIONS = 3  # of the search from each, after which the best goes on with all
-MOST_EVALUATIONS = 200
 TOLERANCE = 1e-6  # relative fall of the squared error, at which the search ends
 DYNAMIC = ("sigma0", "sigma1")  # N/m, N s/m: stiffness and damping of a friction's bristles
 STATIC = "Fs"  # N, the force that they break away at
@@ -91,7 +90,9 @@ def fit_bristles(
     def left(x: Array, logs: Sequence[PreparedLog]) -> Array:
         return residual(write(known, where, x), logs)
 
-    def search(logs: Sequence[PreparedLog], start: Array, evaluations: int) -> Array:
+    def search(
+        logs: Sequence[PreparedLog], start: Array, evaluations: int = MOST_EVALUATIONS
+    ) -> Array:
         return minimise(
             lambda x: left(x, logs), lambda x: jacobian(write(known, where, x), logs, where),
             start, (low, high), tolerance=TOLERANCE, most_evaluations=evaluations,
@@ -103,4 +104,4 @@ def fit_bristles(
     heads = [PreparedLog.of(w.motion.head(HEAD), w.test_function.length) for w in logs]
     tried = [search(heads, start, FIRST_EVALUATIONS) for start in starts]
     best = min(tried, key=lambda x: float(np.sum(left(x, heads) ** 2)))
-    return write(known, where, search(logs, best, MOST_EVALUATIONS))
+    return write(known, where, search(logs, best))

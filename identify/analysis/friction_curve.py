@@ -22,8 +22,6 @@ from identify.estimation.least_squares import minimise
 from twin.errors import InputError
 from twin.signals import Array
 
-TOLERANCE = 1e-14  # of the sum of squares: the map of a simulation has hardly any noise
-MOST_EVALUATIONS = 200
 PARTS = (1.0, 0.3, 0.1)  # of the start rule's v0, from which the search begins
 SLOWEST = 1e-3  # of the lowest speed, least Stribeck velocity that is tried
 NAMES = ("Fc", "Fs", "v0", "sigma2")
@@ -160,7 +158,6 @@ def fit_stribeck(
         minimise(
             residual, lambda x: scale[:, None] * curve(x).slopes(speed),
             start * (1.0, 1.0, part, 1.0), (low, high),
-            tolerance=TOLERANCE, most_evaluations=MOST_EVALUATIONS,
         ).x
         for part in PARTS
     ]  # fmt: skip

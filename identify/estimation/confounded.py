@@ -7,15 +7,14 @@ and the mass) is absorbed by the fit and never found missing. It shows as a chan
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit
-from identify.estimation.fit_problem import is_linear
+from identify.estimation.fit import Fit, is_linear
 from identify.estimation.force_balance import changes, jacobian, residual
 from identify.estimation.intervals import half_widths
 from identify.estimation.least_squares import orthonormal, unabsorbed
@@ -70,18 +69,14 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     where = fit.scaling.where
     before, after = read(given, where), read(fit.axis, where)
     moved = np.flatnonzero(np.abs(after - before) > half_widths(fit))
-    found: list[tuple[Change, Array]] = []
-    for j, back in zip(moved, _backs(fit, moved, before - after), strict=True):
-        c = where[j]
-        change = Change(
-            c.label, float(before[j]), float(after[j]), units(c.parameter.unit), rms(back),
-            force_unit=units.force,
-        )  # fmt: skip
-        found.append((change, back))
-    found = [t for t in found if t[0].force > LEAST_FORCE * error]
-    found = sorted(found, key=lambda t: -t[0].force)[:MOST_CHANGES]
-    alike = _alike(fit, catalogue, [back for _, back in found])
-    told = (replace(change, alike=own) for (change, _), own in zip(found, alike, strict=True))
+    backs = _backs(fit, moved, before - after)
+    found = sorted(zip(map(rms, backs), moved, backs, strict=True), key=lambda t: -t[0])
+    found = [t for t in found if t[0] > LEAST_FORCE * error][:MOST_CHANGES]
+    alike = _alike(fit, catalogue, [back for *_, back in found])
+    told = []
+    for (force, j, _), names in zip(found, alike, strict=True):
+        unit, values = units(where[j].parameter.unit), (float(before[j]), float(after[j]))
+        told.append(Change(where[j].label, *values, unit, force, names, units.force))
     return Refit(error, fit.error, tuple(told), units.force)
 
 
@@ -108,14 +103,18 @@ def _alike(fit: Fit, catalogue: Catalogue, forces: Sequence[Array]) -> list[tupl
     whole = fit.logs[0]
     head = PreparedLog.of(whole.motion.head(HEAD), whole.test_function.length)
     first = fit.kept[: len(head)]
+
+    def is_made(force: Array, basis: Array) -> bool:
+        left = np.linalg.norm(unabsorbed(force[: len(basis)], basis))
+        return bool(left < SAME_FORCE * np.linalg.norm(force))
+
     for effect in _linear_effects(fit, catalogue) if forces else ():
         begun = orthonormal(_columns(fit, effect, [head])[first])
-        possible = [f for f in forces if _size_left(f[: len(begun)], begun) < _same(f)]
-        if not possible:
+        if not any(is_made(force, begun) for force in forces):
             continue
         basis = orthonormal(_columns(fit, effect, fit.logs)[fit.kept])
         for names, force in zip(found, forces, strict=True):
-            if _size_left(force, basis) < _same(force):
+            if is_made(force, basis):
                 names.append(effect.name)
     return [tuple(names) for names in found]
 
@@ -140,16 +139,6 @@ def _columns(fit: Fit, effect: Effect, logs: Sequence[PreparedLog]) -> Array:
     return jacobian(fit.axis.with_effect(Fitted.at_start(effect)), logs, where)
 
 
-def _size_left(force: Array, basis: Array) -> float:
-    """Size of what a basis leaves of a force (n,): root of the sum of squares, N."""
-    return float(np.linalg.norm(unabsorbed(force, basis)))
-
-
-def _same(force: Array) -> float:
-    """Size below which what is left of a force is nothing."""
-    return SAME_FORCE * float(np.linalg.norm(force))
-
-
 @dataclass(frozen=True)
 class MovedParameter:
     """A parameter that an added effect changed by more than it scatters between blocks of the logs.
@@ -167,20 +156,22 @@ class MovedParameter:
 
 def moved_parameters(before: Fit, after: Fit) -> tuple[MovedParameter, ...]:
     """The parameters of the smaller model that changed when the effect was added."""
-    shared = [c for c in before.scaling.where if c in after.scaling.where]
-    old, new = read(before.axis, shared), read(after.axis, shared)
-    index = [after.scaling.where.index(c) for c in shared]
-    width = half_widths(after)[index]
-    earlier = half_widths(before)[[before.scaling.where.index(c) for c in shared]]
-    allowed = np.hypot(width, earlier)
+    was, now = (
+        {
+            c: (value, width)
+            for c, value, width in zip(
+                fit.scaling.where, read(fit.axis, fit.scaling.where), half_widths(fit), strict=True
+            )
+        }
+        for fit in (before, after)
+    )
     out = []
-    for c, a, b, limit, first in zip(shared, old, new, allowed, earlier, strict=True):
-        p = c.parameter
+    for c in (c for c in was if c in now):
+        (a, earlier), (b, later) = was[c], now[c]
         # Its new interval does not matter here: a confounded parameter may be collinear with the
         # effect.
-        collapsed = p.strength and abs(b) < RULE.collapse * abs(a) and abs(a) > first
-        if not collapsed and not abs(b - a) > limit:
-            continue
-        unit = after.axis.units(p.unit)
-        out.append(MovedParameter(c.label, float(a), float(b), unit, bool(collapsed)))
+        collapsed = c.parameter.strength and abs(b) < RULE.collapse * abs(a) and abs(a) > earlier
+        if collapsed or abs(b - a) > np.hypot(earlier, later):
+            unit = after.axis.units(c.parameter.unit)
+            out.append(MovedParameter(c.label, float(a), float(b), unit, bool(collapsed)))
     return tuple(out)

@@ -35,7 +35,7 @@ from twin.signals import Array, between
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
-STEP = 1e-5  # of a value, of a difference quotient
+STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
 LEAST_PART = 1e-3  # of what is usual, by which a smaller value is stepped as if it were that large
 AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 

@@ -21,25 +21,20 @@ from functools import lru_cache
 
 import numpy as np
 
-from identify.estimation.evidence import blocks_of, by_blocks, left_out
-from identify.estimation.fit import Fit
-from identify.estimation.fit_problem import is_linear
-from identify.estimation.force_balance import changes
+from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
+from identify.estimation.fit import Fit, is_linear
+from identify.estimation.force_balance import STEP, changes
+from identify.estimation.least_squares import EXACT, ROUNDING
 from identify.rules import RULE
 from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
 from twin.signals import Array
 
-BLOCKS = 30  # of time, for the scatter: many for Student's t, each longer than the memory
-RIDGE = 1e-6  # keeps a fit without one block finite
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
-CONFIDENCE = 0.90
-QUANTILE = 1.6991270265334972  # of Student's t for it, with BLOCKS - 1 degrees of freedom
+CONFIDENCE = 1.0 - 2.0 * RULE.chance  # as the truth may be off to either side
+QUANTILE = students_t(RULE.chance, BLOCKS - 1)
 GROUPS = 10  # of like influence; wide, as a law differs from the machine's over wide stretches
-GROUPS_QUANTILE = 1.8331129326562374  # of Student's t for GROUPS - 1
-TINY = 1e-12  # of the squared influence, which may lie in one group
 FAR = 4.0  # half widths to either side at which the error must have risen
-BAND_STEP = 0.1  # of a half width, the step of a difference for the band of a curve
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
 # Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
 # missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
@@ -105,30 +100,27 @@ class Estimate:
 
 def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """Estimates of all parameters of a fitted axis, free ones first."""
-    half = half_widths(fit)
-    if (common := refusal(fit)) is None:
-        reasons = _undetermined(fit, half)
-    else:
-        reasons = {c.label: common for c in fit.scaling.where}
-    values = read(fit.axis, fit.scaling.where)
-    free = []
-    for c, value, width in zip(fit.scaling.where, values, half, strict=True):
+    return (*_free(fit, refusal(fit)), *_held(fit))
+
+
+def _free(fit: Fit, common: NoInterval | None) -> list[Estimate]:
+    """Estimates of the free parameters; common: why none has an interval, or None."""
+    where, half, units = fit.scaling.where, half_widths(fit), fit.axis.units
+    reasons = {c.label: common for c in where} if common else _undetermined(fit, half)
+    out = []
+    for c, value, width in zip(where, read(fit.axis, where).tolist(), half, strict=True):
         p, why = c.parameter, reasons.get(c.label)
-        low = None if why else max(value - width, p.lower)
-        high = None if why else min(value + width, p.upper)
-        unit = fit.axis.units(p.unit)
-        free.append(Estimate(c.label, float(value), unit, low, high, True, why))
-    return (*free, *_held(fit))
+        low = None if why else float(max(value - width, p.lower))
+        high = None if why else float(min(value + width, p.upper))
+        out.append(Estimate(c.label, value, units(p.unit), low, high, True, why))
+    return out
 
 
 def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
     """Why parameters have none of their own, however good the model is."""
     where = fit.scaling.where
-    out: dict[str, NoInterval] = {
-        c.label: NotExcited() for c, width in zip(where, half, strict=True) if not width < np.inf
-    }
-    for label, other in inseparable(fit).items():
-        out.setdefault(label, Inseparable(other))
+    out: dict[str, NoInterval] = {label: Inseparable(o) for label, o in inseparable(fit).items()}
+    out |= {c.label: NotExcited() for c, w in zip(where, half, strict=True) if not w < np.inf}
     asked = [j for j, c in enumerate(where) if c.label not in out]
     sides = open_sides(fit, [where[j] for j in asked], half[asked])
     return out | {label: OpenSided(side) for label, side in sides.items()}
@@ -140,11 +132,7 @@ def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
     What is refused where the fit is told is refused in the file: of a wrong model the intervals
     of one actuator from two logs need not overlap.
     """
-    ends = {
-        e.label: (float(e.low), float(e.high))
-        for e in found
-        if e.low is not None and e.high is not None
-    }
+    ends = {e.label: (e.low, e.high) for e in found if e.low is not None and e.high is not None}
     return AxisIntervals(ends, float(fit.ratio) if len(fit.residual) else 1.0)
 
 
@@ -154,14 +142,7 @@ def scatter(fit: Fit) -> AxisIntervals:
     To compare a machine with its twin on the same motion, which a wrong model fits alike. No
     interval of a true value, and never written.
     """
-    where, half = fit.scaling.where, half_widths(fit)
-    without = _undetermined(fit, half)
-    ends = {
-        c.label: (float(value - h), float(value + h))
-        for c, value, h in zip(where, read(fit.axis, where), half, strict=True)
-        if c.label not in without
-    }
-    return AxisIntervals(ends, float(fit.ratio))
+    return intervals_to_keep(fit, _free(fit, None))
 
 
 def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> dict[str, Side]:
@@ -196,7 +177,7 @@ def inseparable(fit: Fit) -> dict[str, str]:
     norms = np.linalg.norm(fit.jacobian, axis=0)
     excited = np.flatnonzero(norms > 0)
     columns = fit.jacobian[:, excited] / norms[excited]
-    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-15, hermitian=True)
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=EXACT, hermitian=True)
     spread = np.sqrt(np.diag(inverse))
     correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))
     labels = [fit.scaling.where[i].label for i in excited]
@@ -234,11 +215,11 @@ def half_widths_of(fit: Fit, weights: Array) -> Array:
     if not excited.any():
         return out
     columns = fit.jacobian[:, excited] / norms[excited]
-    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-12, hermitian=True)
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=ROUNDING, hermitian=True)
     # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
     # without the block are used (jackknife, CR3).
-    honest = left_out(fit.residual, columns, np.full(columns.shape[1], RIDGE), BLOCKS)
-    scores = by_blocks(columns, honest, blocks_of(len(honest), BLOCKS))
+    honest = left_out(fit.residual, columns)
+    scores = by_blocks(columns, honest, blocks_of(len(honest)))
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     own = weights[excited][:, known] / norms[excited][:, None]
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
@@ -264,9 +245,9 @@ def _by_influence(influence: Array, residual: Array) -> float:
     first = np.searchsorted(np.cumsum(told) - 0.5 * told, whole * np.arange(1, GROUPS) / GROUPS)
     edges = np.sqrt(told[np.minimum(first, len(size) - 1)])
     group = np.count_nonzero(size >= edges[:, None], axis=0)
-    left = np.maximum(1.0 - np.bincount(group, size**2, GROUPS) / whole, TINY)
+    left = np.maximum(1.0 - np.bincount(group, size**2, GROUPS) / whole, ROUNDING)
     moved = np.bincount(group, influence * residual, GROUPS)
-    return GROUPS_QUANTILE * float(np.sqrt((moved**2 / left).sum()))
+    return students_t(RULE.chance, GROUPS - 1) * float(np.sqrt((moved**2 / left).sum()))
 
 
 def _held(fit: Fit) -> list[Estimate]:
@@ -299,6 +280,6 @@ def with_band(
     slopes = np.zeros((len(where), len(centre)))
     for i in np.flatnonzero(np.isfinite(half)):
         if where[i] in among:
-            step = BAND_STEP * half[i]
+            step = STEP * half[i]
             slopes[i] = (curve(write(fit.axis, [where[i]], [values[i] + step])) - centre) / step
     return centre, half_widths_of(fit, slopes)

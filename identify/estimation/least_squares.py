@@ -1,7 +1,7 @@
 """Least squares: Levenberg-Marquardt within bounds, and what the span of some columns holds.
 
 K. Levenberg (1944), D. W. Marquardt (1963), with the damping schedule of L. Jia (2023): 0.01 to
-start, a tenth on success, tenfold on failure; after a step that keeps too little of what it
+start, a tenth on success, tenfold on failure; after a step that keeps less than most of what it
 promised it stays as it is, or the next step would fail. A variable at a bound that the gradient
 pushes outwards is held there for the step. It solves the normal equations of scaled columns, which
 costs two matrix products an iteration; the QR decomposition of a general solver took most of a fit.
@@ -22,11 +22,11 @@ import numpy as np
 from twin.signals import Array
 
 FIRST_DAMPING = 1e-2
-MOST_DAMPING = 1e8
-LEAST_DAMPING = 1e-6
-KEPT = 0.75  # of the fall that the columns promise, from which they are followed by a secant
-ROUNDING = 1e-15  # of the cost, below which a promised fall is rounding
-POOR = 0.5  # of that fall, up to which the damping stays
+MOST = 0.75  # of the fall that the columns promise: kept, the next step may trust them more
+MOST_EVALUATIONS = 100  # of a search that is only to end
+RIDGE = 1e-4  # of a column's length, which keeps what is not excited, or explained twice, finite
+ROUNDING = 1e-12  # of a sum of squares: what thousands of terms of rounding leave of nothing
+EXACT = float(np.finfo(float).eps)  # relative fall of a sum of squares that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ def minimise(
     start: Array,
     bounds: tuple[Array, Array],
     *,
-    tolerance: float,
-    most_evaluations: int,
+    tolerance: float = EXACT,
+    most_evaluations: int = MOST_EVALUATIONS,
 ) -> Solution:
     """Variables that minimise the sum of squares of the residual (n,) within bounds (k,), (k,).
 
@@ -55,7 +55,7 @@ def minimise(
     x = np.clip(start, low, high)
     force = residual(x)
     cost = float(force @ force)
-    damping = FIRST_DAMPING
+    damping, most_damping = FIRST_DAMPING, 1.0 / np.sqrt(EXACT)
     if not np.isfinite(cost):
         return Solution(x, False)
     columns, exact = jacobian(x), True
@@ -65,11 +65,9 @@ def minimise(
         trial = residual(moved)
         trial_cost = float(trial @ trial)
         if trial_cost <= cost:
-            expected = _cost(force + columns @ (moved - x))
+            promised = cost - _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
-            least = max(ROUNDING * cost, np.finfo(float).tiny)
-            kept = (cost - trial_cost) / max(cost - expected, least)
-            good = kept > KEPT
+            good = cost - trial_cost > MOST * max(promised, EXACT * cost)
             if fall < tolerance and exact:
                 return Solution(moved, True)
             if good and fall >= tolerance:
@@ -78,7 +76,7 @@ def minimise(
                 del columns  # not to be held beside the new ones
                 columns, exact = jacobian(moved), True
             x, force, cost = moved, trial, trial_cost
-            damping = max(damping * (0.1 if kept > POOR else 1.0), LEAST_DAMPING)
+            damping = max(0.1 * damping, 1.0 / most_damping) if good else damping
         elif not exact:
             del columns
             columns, exact = jacobian(x), True
@@ -86,7 +84,7 @@ def minimise(
             return Solution(x, True)  # nearly undamped and not cut at bounds, it promises no more
         else:
             damping *= 10.0
-            if damping > MOST_DAMPING or not np.any(moved != x):
+            if damping > most_damping or not np.any(moved != x):
                 return Solution(x, True)
     return Solution(x, False)
 
@@ -129,10 +127,21 @@ def orthonormal(columns: Array) -> Array:
     norms = np.linalg.norm(columns, axis=0)
     scaled = columns[:, norms > 0] / norms[norms > 0]
     power, directions = np.linalg.eigh(scaled.T @ scaled)
-    kept = power > 1e-12 * power.max(initial=1.0)
+    kept = power > ROUNDING * power.max(initial=1.0)
     return scaled @ (directions[:, kept] / np.sqrt(power[kept]))
 
 
 def unabsorbed(force: Array, basis: Array) -> Array:
     """The part of forces (n,) or (n, k), N, outside the span of an orthonormal basis (n, r)."""
     return np.asarray(force - basis @ (basis.T @ force))
+
+
+def solve(matrix: Array, right: Array) -> Array:
+    """Solution (..., k, m) of symmetric positive systems, scaled as their unknowns differ in unit.
+
+    matrix (..., k, k), right (..., k, m). An unknown that nothing depends on is 0.
+    """
+    own = np.diagonal(matrix, axis1=-2, axis2=-1)[..., None]
+    size = np.sqrt(np.where(own > 0.0, own, 1.0))
+    scaled = matrix / size / np.swapaxes(size, -1, -2) + ROUNDING * np.eye(matrix.shape[-1])
+    return np.asarray(np.linalg.solve(scaled, right / size) / size)

@@ -17,16 +17,16 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
 from identify.dataset.spectrum import Record, SpectralLine, find_lines
+from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Fit
+from identify.estimation.fit import LINES, Fit
 from identify.rules import RULE
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array
 
 BINS = (24, 96, 384)  # numbers of bins along a coordinate
-FEWEST_CYCLES = 2  # over the span, below which a repetition is not one
-WINDOWS_A_PERIOD = 4
-TRIED = 6  # least likely by chance, of which the strongest counts
+SAME_PERIOD = 0.02  # relative difference, or of a turn, within which two are one
+SAME = 0.5  # difference of two terms over the larger, below which they are one
 
 
 @dataclass(frozen=True)
@@ -154,20 +154,20 @@ def line(
 
     runs: where further runs begin, between which the line keeps its period but not its phase.
     """
-    span = float(np.ptp(coordinate))
-    if span == 0.0:
-        return None
     parts = zip(np.split(coordinate, runs), np.split(residual, runs), strict=True)
-    records = [Record(*part) for part in parts]
-    highest = len(residual) / (WINDOWS_A_PERIOD * span)
-    best = _strongest(records, FEWEST_CYCLES / span, highest)
+    best = _strongest([Record(*part) for part in parts])
     return (best.period, best.share) if best and best.share > RULE.line_share else None
 
 
-FEWEST_REPEATS = 10  # over the travel
-MOST_REPEATS = 4096  # over the travel
-SHARED = 0.02  # relative difference of two periods that are one
-SAME = 0.5  # difference of two terms over the larger, below which they are one
+def _strongest(records: Sequence[Record]) -> SpectralLine | None:
+    """The strongest line that all the records share and that is no chance, if there is one."""
+    span = max(r.span for r in records)
+    if span == 0.0:
+        return None
+    lowest = RULE.fewest_cycles / span
+    highest = max(len(r.values) for r in records) / (OVERLAP * span)
+    found = find_lines(records, lowest, highest, most=LINES, chance=RULE.line_chance)
+    return max(found, key=lambda line: line.share, default=None)
 
 
 @dataclass(frozen=True)
@@ -196,13 +196,13 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     if len(logs) < 2:
         return None
     records = [Record(log.motion.position, _left_on_blocks(fit, log)) for log in logs]
-    lines = [_repeat([record]) for record in records]
+    lines = [_strongest([record]) for record in records]
     periods = [line.period for line in lines if line is not None]
-    if len(periods) < len(logs) or np.ptp(periods) > SHARED * periods[0]:
+    if len(periods) < len(logs) or np.ptp(periods) > SAME_PERIOD * periods[0]:
         return None
-    common = _repeat(records)
+    common = _strongest(records)
     period = float(np.median(periods))
-    if common is not None and abs(common.period - period) <= SHARED * period:
+    if common is not None and abs(common.period - period) <= SAME_PERIOD * period:
         period = common.period
     # Far from the data a phase would hold the error of the period, times the periods between.
     middle = float(np.mean(np.concatenate([r.coordinate for r in records])))
@@ -224,20 +224,6 @@ def _left_on_blocks(fit: Fit, log: PreparedLog) -> Array:
     m = log.motion
     force = total_force(on_blocks(fit.axis), m)
     return np.asarray(m.net + force - fit.axis.mass * m.acceleration)
-
-
-def _repeat(records: Sequence[Record]) -> SpectralLine | None:
-    """The strongest line in position that all the records share, if one stands out."""
-    span = max(r.span for r in records)
-    if span <= 0.0:
-        return None
-    return _strongest(records, FEWEST_REPEATS / span, MOST_REPEATS / span)
-
-
-def _strongest(records: Sequence[Record], lowest: float, highest: float) -> SpectralLine | None:
-    """The strongest line between two frequencies that is no chance, if there is one."""
-    found = find_lines(records, lowest, highest, most=TRIED, chance=RULE.line_chance)
-    return max(found, key=lambda line: line.share, default=None)
 
 
 def _term(force: Array, position: Array, period: float) -> complex:

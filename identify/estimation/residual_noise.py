@@ -23,10 +23,12 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectrum import Record, find_lines
-from identify.estimation.evidence import blocks_of, by_blocks, effective_samples, rms
-from identify.estimation.fit import Fit, Outcome, error_on, finished
+from identify.dataset.test_function import OVERLAP
+from identify.estimation.evidence import SURE, blocks_of, by_blocks, effective_samples, rms
+from identify.estimation.fit import LINES, Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import orthonormal, unabsorbed
+from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
@@ -36,22 +38,9 @@ MOVED = ("velocity", "acceleration", "direction")
 RIDGES = (0.01, 1.0)  # of a column's square: for many samples, and for few that slow noise leaves
 CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
 SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
-SEED = 0  # of the shifts
-LEAST_LOGS = 2  # one does not tell: where an axis comes by once nothing is foretold
-MOST = 0.5  # of the force, RMS: a larger rest is of another machine
-ALL = 1.1  # of the floor: it is known to a tenth, and nothing more is left
 ALIKE = 1.5  # times the error of the training logs that noise may have on others
-FORETOLD = 0.1  # of its square, below which what is foretold is too little to matter
-FORETOLD_SIZE = 0.05  # the same of the variance of its size, most of which is chance
-LINE = (1e-3, 0.2)  # chance and share of a spectral line that is no noise
-LINES = 6  # least likely by chance, of which none may be strong
-CYCLES = (
-    0.5 * HATS
-)  # of a line over the span at least: of fewer curves tell, and slow noise has some
-SAMPLES = 4.0  # test functions a period at least
+MOST = 0.5  # of the force, RMS: a larger rest is of another machine
 GAUSSIAN, LAPLACE = 3.0, 6.0  # kurtosis of these noises
-SURE = 3.0  # standard errors by which a tone's kurtosis is below that of noise
-QUIET = 0.1  # of the mean square, below which the size of a force does not matter
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,29 +69,28 @@ class Remainder:
 
     def is_foretold(self) -> bool:
         """Whether something foretells a part of the force that matters."""
-        return self._foretold(self.force, self.basis, FORETOLD)
+        return self._foretold(self.force, self.basis)
 
     def size_is_foretold(self) -> bool:
         """The same of its size, the logarithm of its square; a few large values do not decide."""
-        squares = self.force**2
-        size = np.log(squares + QUIET * squares.mean())
-        return self._foretold(size - size.mean(), np.zeros((len(size), 0)), FORETOLD_SIZE)
+        size = np.log1p(self.force**2 / max(np.mean(self.force**2), np.finfo(float).tiny))
+        return self._foretold(size - size.mean(), np.zeros((len(size), 0)))
 
-    def _foretold(self, values: Array, basis: Array, least: float) -> bool:
+    def _foretold(self, values: Array, basis: Array) -> bool:
         """Whether a part of values (n,), and more than of any control, is foretold by something.
 
-        basis (n, k): of what was fitted already. least: part of the square, 0..1.
+        basis (n, k): of what was fitted already.
         """
         tried = np.column_stack([values, self._controls(values)])
         tried = unabsorbed(tried, basis)
         columns = (unabsorbed(c, basis) for c in self._predictors())
         best = np.max([self._parts(c, tried) for c in columns], axis=0)
-        return bool(best[0] > least and best[0] > best[1:].max())
+        return bool(best[0] > RULE.least_fall and best[0] > best[1:].max())
 
     def _controls(self, force: Array) -> Array:
         """The force shifted within each log, (n, CONTROLS)."""
         spans = np.split(np.arange(len(force)), np.flatnonzero(np.diff(self.logs)) + 1)
-        shifts = np.random.default_rng(SEED).uniform(*SHIFTS, (CONTROLS, len(spans)))
+        shifts = np.random.default_rng(0).uniform(*SHIFTS, (CONTROLS, len(spans)))
         rolled = [
             [np.roll(force[at], round(s * len(at))) for s, at in zip(row, spans, strict=True)]
             for row in shifts
@@ -144,9 +132,9 @@ class Remainder:
 
 def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
-    logs = (*dataset.fit, *dataset.holdout)
+    logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once foretells nothing
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
-    if len(logs) < LEAST_LOGS or fit.error > MOST * rms(command):
+    if len(logs) == 1 or fit.error > MOST * rms(command):
         return False
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
@@ -163,7 +151,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
 
 def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
     """Dataset and fit with what is left as part of the noise floor, where it is noise."""
-    if fit.ratio < ALL or not is_noise(fit, dataset):
+    if fit.at_floor or not is_noise(fit, dataset):
         return dataset, fit
     own = np.sqrt(fit.error**2 - fit.floor**2 + dataset.force_noise**2)
     dataset = dataset.with_force_noise(float(own))
@@ -191,13 +179,12 @@ def _repeats(force: Array, at: Array, runs: Sequence[int] | NDArray[np.int64]) -
     span = float(np.ptp(at))
     if span == 0.0:
         return False
-    chance, share = LINE
     parts = zip(np.split(at, runs), np.split(force, runs), strict=True)
-    highest = len(force) / (SAMPLES * span)
-    found = find_lines(
-        [Record(*part) for part in parts], CYCLES / span, highest, most=LINES, chance=chance
-    )
-    return any(line.share > share for line in found)
+    # Of fewer cycles than its knots can follow curves tell, and slow noise has some.
+    lowest, highest = 0.5 * HATS / span, len(force) / (OVERLAP * span)
+    records = [Record(*part) for part in parts]
+    found = find_lines(records, lowest, highest, most=LINES, chance=RULE.line_chance)
+    return any(line.share > RULE.line_share for line in found)
 
 
 def _past(where: dict[str, Array], logs: NDArray[np.int64]) -> Array:

@@ -25,7 +25,7 @@ Limits = tuple[float, float]
 
 BEYOND = 4.0  # times the travel or the top speed: what is longer or faster shows as a constant
 DECADES = 1e9  # a scale is sought within this factor of what is usual, as good as everywhere
-AT_EDGE = 1e-6  # of a bound, within which a value is at it
+AT_EDGE = float(np.sqrt(np.finfo(float).eps))  # of a bound, within which a value is at it
 
 
 def limits_of(p: Parameter, value: float, scale: Scale) -> Limits:

@@ -23,7 +23,7 @@ import numpy as np
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Outcome
-from identify.estimation.least_squares import Solution, minimise
+from identify.estimation.least_squares import MOST_EVALUATIONS, Solution, minimise
 from identify.estimation.open_loop import (
     LEAST_READING,
     Beginning,
@@ -40,7 +40,6 @@ from twin.signals import Array
 STARTS = 4  # of the search: the axis as given, and places around it
 AROUND = 0.1  # standard deviation of those, in parts of each value
 FIRST_EVALUATIONS = 10  # of the search from each, after which the best goes on with all
-MOST_EVALUATIONS = 100
 MOST_COMPARED = 20_000  # samples of a log
 MOST_WEIGHINGS = 6  # of the beginnings against the error, which falls on the way
 FALLS = 0.9  # of the error, above which the weights are right

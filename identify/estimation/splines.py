@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.evidence import blocks_of, by_blocks
-from identify.estimation.fit import Fit
-from identify.estimation.fit_problem import part_rows, smoothing
+from identify.estimation.evidence import BETTER, blocks_of, by_blocks
+from identify.estimation.fit import Fit, part_rows, smoothing
 from identify.estimation.force_balance import jacobian
+from identify.estimation.least_squares import RIDGE, solve
 from twin.curve import Part
 from twin.model.machine import Fitted
 from twin.model.parameters import ParameterReference
 from twin.signals import Array
 
 STIFFNESS = tuple(10.0 ** np.arange(1.0, -5.1, -0.5))  # tried for each part
-WORTH = 0.99  # a further part must lower the squared cross-validated error below this part
-ROUNDING = 1e-12  # of a unit diagonal, keeps a system solvable
-RIDGE = 1e-4  # on the physics, in units of their columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +93,7 @@ class Linearised:
 
     def _chosen(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
         """Which columns are used, and the penalty (k, k), with these parts and their stiffness."""
-        used = ~np.any([mask for _, mask in self.parts.values()], axis=0)
+        used = ~self._own
         penalty = self.physics.copy()
         for name, value in stiffness.items():
             rows, mask = self.parts[name]
@@ -105,29 +102,56 @@ class Linearised:
         return used, penalty
 
     @cached_property
-    def _rest(self) -> _Rest:
-        """What the parts meet when each block is left out."""
-        own = np.any([mask for _, mask in self.parts.values()], axis=0)
-        return _Rest.of(self.columns, self.force, self.physics, own)
+    def _own(self) -> NDArray[np.bool_]:
+        """Which columns (k,) are the parts'; o in number."""
+        return np.any([mask for _, mask in self.parts.values()], axis=0)
 
-    def _without(self, stiffness: Mapping[str, float]) -> tuple[NDArray[np.bool_], Array]:
-        """Which of the parts' columns take part, and their changes (b, k) without each block."""
+    @cached_property
+    def _reduced(self) -> tuple[list[slice], Array, Array, Array, Array, Array]:
+        """Of b blocks, each to be left out: the samples, and the least squares of the parts alone.
+
+        The penalty of the physics does not change with the stiffness of the parts, so the physics
+        are eliminated once (the Schur complement). What follows from 1 and the parts' changes:
+        changes of all columns (b, k, 1 + o), normal equations (b, o, o) with their right sides
+        (b, o) by the other blocks, products of the block that is left out with itself
+        (b, 1 + o, 1 + o) and with the force (b, 1 + o).
+        """
+        own, spans = self._own, blocks_of(len(self.force))
+        grams = by_blocks(self.columns, self.columns, spans)
+        pulls = by_blocks(self.columns, self.force, spans)[..., None]
+        others, aims = grams.sum(axis=0) - grams + self.physics, pulls.sum(axis=0) - pulls
+        base, count = others[:, ~own], int(own.sum())
+        follow = np.zeros((len(spans), len(own), 1 + count))
+        right = np.concatenate([aims[:, ~own], -base[:, :, own]], axis=2)
+        follow[:, ~own] = solve(base[:, :, ~own], right)
+        follow[:, own, 1:] = np.eye(count)
+        normal, back = others[:, own] @ follow, follow.swapaxes(1, 2)
+        wanted = aims[:, own, 0] - normal[..., 0]
+        return spans, follow, normal[..., 1:], wanted, back @ grams @ follow, (back @ pulls)[..., 0]
+
+    def _without(self, stiffness: Mapping[str, float]) -> Array:
+        """1 and the changes of the parts' columns (b, 1 + o) that fit best without each block."""
+        own, (_, _, normal, wanted, _, _) = self._own, self._reduced
         used, penalty = self._chosen(stiffness)
-        own = self._rest.own
-        return used[own], self._rest.changes(used[own], penalty[np.ix_(own, own)])
+        kept = used[own]
+        out = np.zeros((len(wanted), 1 + len(kept)))
+        out[:, 0] = 1.0
+        matrix = (normal + penalty[np.ix_(own, own)])[:, kept][:, :, kept]
+        out[:, 1:][:, kept] = solve(matrix, wanted[:, kept, None])[..., 0]
+        return out
 
     def left_out(self, stiffness: Mapping[str, float]) -> Array:
         """Cross-validated residual (n,) N: each block predicted by a fit to the others."""
-        used, changes = self._without(stiffness)
-        every = self._rest.of_all(used, changes)
-        out = self.force.copy()
-        for span, change in zip(self._rest.spans, every, strict=True):
-            out[span] -= self.columns[span] @ change
-        return out
+        each = zip(*self._reduced[:2], self._without(stiffness), strict=True)
+        return self.force - np.concatenate(
+            [self.columns[span] @ (f @ own) for span, f, own in each]
+        )
 
     def left_out_error(self, stiffness: Mapping[str, float]) -> float:
         """Sum of its squares, N^2."""
-        return self._rest.squared_error(*self._without(stiffness))
+        changes, (_, _, _, _, gram, pull) = self._without(stiffness), self._reduced
+        square = np.einsum("bi,bij,bj->", changes, gram, changes)
+        return float(self.force @ self.force - 2.0 * np.sum(changes * pull) + square)
 
     def solution(self, stiffness: Mapping[str, float]) -> tuple[Array, float]:
         """Change (k,) of all parameters that fits best, and its effective degrees of freedom."""
@@ -140,94 +164,12 @@ class Linearised:
         return out, float(np.trace(solve(full, gram)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Rest:
-    """What the columns of parts meet when each block is left out, the physics having followed.
-
-    The penalty of the physics does not change with the stiffness of the parts, so it is eliminated
-    once (the Schur complement), and each stiffness solves for the parts alone. spans: samples of
-    each of b blocks. own (k,): which columns are the parts'. follows (b, k_physics, k_own) and
-    alone (b, k_physics): the physics' change is alone - follows x that of the parts. normal (b,
-    k_own, k_own), wanted (b, k_own): of the other blocks. gram (b, k_own, k_own), pull (b, k_own),
-    square N^2: of the block that is left out.
-    """
-
-    spans: list[slice]
-    own: NDArray[np.bool_]
-    follows: Array
-    alone: Array
-    normal: Array
-    wanted: Array
-    gram: Array
-    pull: Array
-    square: float
-
-    @classmethod
-    def of(cls, columns: Array, force: Array, physics: Array, own: NDArray[np.bool_]) -> _Rest:
-        spans = blocks_of(len(force))
-        grams, pulls = by_blocks(columns, columns, spans), by_blocks(columns, force, spans)
-        others, aims = grams.sum(axis=0) - grams, pulls.sum(axis=0) - pulls
-        base = others[:, ~own][:, :, ~own] + physics[np.ix_(~own, ~own)]
-        across = others[:, ~own][:, :, own]
-        solved = solve(base, np.concatenate([across, aims[:, ~own, None]], axis=2))
-        follows, alone = solved[..., :-1], solved[..., -1]
-        back = across.swapaxes(1, 2)
-        # The block's own products, with the physics taken out of force and columns.
-        count = int(own.sum())
-        out = np.zeros((len(spans), len(own), count))
-        out[:, ~own], out[:, own] = -follows, np.eye(count)
-        held = np.zeros((len(spans), len(own)))
-        held[:, ~own] = alone
-        seen = (grams @ held[..., None])[..., 0]
-        square = force @ force - 2.0 * np.sum(held * pulls) + np.sum(held * seen)
-        return cls(
-            spans, own, follows, alone,
-            normal=others[:, own][:, :, own] - back @ follows,
-            wanted=aims[:, own] - (back @ alone[..., None])[..., 0],
-            gram=out.swapaxes(1, 2) @ grams @ out,
-            pull=(out.swapaxes(1, 2) @ (pulls - seen)[..., None])[..., 0],
-            square=float(square),
-        )  # fmt: skip
-
-    def changes(self, used: NDArray[np.bool_], penalty: Array) -> Array:
-        """Changes (b, k_used) of the parts' columns that are used, under a penalty (k_own, k_own).
-
-        Each by the other blocks.
-        """
-        normal = (self.normal + penalty)[:, used][:, :, used]
-        return solve(normal, self.wanted[:, used, None])[..., 0]
-
-    def of_all(self, used: NDArray[np.bool_], changes: Array) -> Array:
-        """Changes (b, k) of all columns, with these of the parts."""
-        out = np.zeros((len(self.spans), len(self.own)))
-        out[:, np.flatnonzero(self.own)[used]] = changes
-        followed = (self.follows[..., used] @ changes[..., None])[..., 0]
-        out[:, ~self.own] = self.alone - followed
-        return out
-
-    def squared_error(self, used: NDArray[np.bool_], changes: Array) -> float:
-        """What is left of the blocks' squared force, N^2."""
-        square = np.einsum("bi,bij,bj->", changes, self.gram[:, used][:, :, used], changes)
-        return float(self.square - 2.0 * np.sum(changes * self.pull[:, used]) + square)
-
-
 def _penalty(
     part: Part, effect: str, where: Sequence[ParameterReference]
 ) -> tuple[Array, NDArray[np.bool_]]:
     rows = part_rows(part, effect, where)
     mask = np.array([c.effect == effect and c.parameter.name in part.strengths for c in where])
     return rows.T @ rows, mask
-
-
-def solve(matrix: Array, right: Array) -> Array:
-    """Solution (..., k, m) of symmetric positive systems, scaled as their unknowns differ in unit.
-
-    matrix (..., k, k), right (..., k, m).
-    """
-    own = np.diagonal(matrix, axis1=-2, axis2=-1)[..., None]
-    size = np.sqrt(np.where(own > 0.0, own, 1.0))
-    scaled = matrix / size / np.swapaxes(size, -1, -2) + ROUNDING * np.eye(matrix.shape[-1])
-    return np.asarray(np.linalg.solve(scaled, right / size) / size)
 
 
 def choose_stiffness(linear: Linearised, tried: Sequence[float] = STIFFNESS) -> dict[str, float]:
@@ -242,7 +184,7 @@ def choose_stiffness(linear: Linearised, tried: Sequence[float] = STIFFNESS) -> 
         waiting = [name for name in linear.parts if name not in chosen]
         found = [_best(linear, chosen, name, tried) for name in waiting]
         further, name, value = min(found)
-        if not further < WORTH * error:
+        if not further < BETTER * error:
             break
         earlier, chosen[name] = tuple(chosen), value
         for other in earlier:

@@ -9,7 +9,7 @@ shapes of the effects that a model has are scanned again (`fit_multistart`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.evidence import BETTER, Evidence
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
+from identify.estimation.least_squares import RIDGE, ROUNDING, minimise, orthonormal, unabsorbed
 from identify.rules import RULE
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.effects import Catalogue
@@ -29,16 +30,9 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 
-RIDGE = 1e-4  # keeps the linear step finite along directions that the base explains already
 MANY_SHAPES = 50  # of which every other value is tried first, then what is beside the best
-BESIDE = 4  # best shapes whose neighbours are tried
-RESCORED_SHAPES = 12  # best shapes of a coarse scan that are tried with every strength
-CHANCE = 4.0  # twice the gain in log likelihood, for each strength, that a scan of noise finds
-FULL_SHAPES = 4  # best shapes on the logs' heads that are tried on all of the logs
+FINALISTS = 4  # best shapes that are looked at more closely: beside them, on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
-FURTHER = 10.0  # times the squared error of the first, from which a start is not fitted
-EXACT = 1e-13  # relative fall of the squared error below which strengths within bounds are found
-MOST_STEPS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,40 +59,38 @@ class Start:
         before = float(base.unabsorbed @ base.unabsorbed)
         return 1.0 - self.squared_error / before if before > 0.0 else 0.0
 
-    def gain(self, base: Fit) -> float:
-        """Twice the gain in log likelihood over the base, on all of its logs."""
-        return float(-base.samples * np.log(max(1.0 - self.share(base), 1e-12)))
+    def is_likely(self, base: Fit) -> bool:
+        """Whether it gains more than its strengths would of noise, by Schwarz's criterion."""
+        told = Evidence(
+            -np.log(max(1.0 - self.share(base), ROUNDING)),
+            len(self.fitted.effect.strengths),
+            base.samples,
+        )
+        return told.delta_bic > 0.0
 
 
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
 
-    All shapes, or of many those that ``_scanned`` picks, are tried on the logs' heads with the
-    screened strengths, the best of them with every strength, and the best of those on all of the
-    logs; the others only if the first gains more there than chance. So are the shapes that make no
-    force on the heads, such as a stop that only a later move reaches. A friction's shapes are told
-    apart by the heads.
+    All shapes are tried on the logs' heads, of many those that ``_scanned`` picks, and the best of
+    them on all of the logs; the others only if the first gains more there than chance. So are the
+    shapes that make no force on the heads, such as a stop that only a later move reaches. A
+    friction's shapes are told apart by the heads.
     """
     excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
     shapes = _seen_to_repeat(effect, list(tried_shapes(effect, excitation)), base.logs)
     found = [Start(shape, absent, nothing, nothing) for shape in shapes]
-    if len(found) <= FULL_SHAPES:
-        whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
-        return _best(whole, found, effect.strengths, REFINED_STARTS)
-    head = _Ground.of(base, dataset, effect, excitation, on_heads=True)
-    coarse = [p for p in effect.strengths if p.screened]
-    if len(found) > RESCORED_SHAPES and len(coarse) < len(effect.strengths):
-        found = _scanned(head, found, coarse)[:RESCORED_SHAPES]
-    found = _scanned(head, found, effect.strengths)
+    whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
+    if len(found) <= FINALISTS:
+        return _best(whole, found)[:REFINED_STARTS]
+    found = _scanned(_Ground.of(base, dataset, effect, excitation, on_heads=True), found)
     if effect.kind is Kind.FRICTION:
         return _unlike(found)
-    whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
     unseen = [s for s in found if s.is_silent]
-    found = [s for s in found if not s.is_silent][:FULL_SHAPES] or unseen[:1]
-    first = _try(whole, found[0].shape, effect.strengths)
-    likely = found[1:] if first.gain(base) > CHANCE * len(effect.strengths) else []
-    others = [_try(whole, s.shape, effect.strengths) for s in (*likely, *unseen)]
+    found = [s for s in found if not s.is_silent][:FINALISTS] or unseen[:1]
+    first = _try(whole, found[0].shape)
+    others = _best(whole, [*(found[1:] if first.is_likely(base) else ()), *unseen])
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
 
 
@@ -115,19 +107,14 @@ def _seen_to_repeat(
     return [s for s in shapes if all(s.get(p, 0.0) <= longest for p in repeating)] or shapes
 
 
-def _best(
-    ground: _Ground, tried: Sequence[Start], strengths: Sequence[Parameter], count: int
-) -> list[Start]:
-    scored = [_try(ground, s.shape, strengths) for s in tried]
-    return sorted(scored, key=lambda s: s.squared_error)[:count]
+def _best(ground: _Ground, tried: Iterable[Start]) -> list[Start]:
+    return sorted((_try(ground, s.shape) for s in tried), key=lambda s: s.squared_error)
 
 
-def _scanned(
-    ground: _Ground, tried: Sequence[Start], strengths: Sequence[Parameter]
-) -> list[Start]:
+def _scanned(ground: _Ground, tried: Sequence[Start]) -> list[Start]:
     """All shapes, best first; of many every other value of each, and those beside the best."""
     if len(tried) <= MANY_SHAPES:
-        return _best(ground, tried, strengths, len(tried))
+        return _best(ground, tried)
     grids = {name: sorted({s.shape[name] for s in tried}) for name in tried[0].shape}
 
     def places(shapes: Sequence[Start]) -> NDArray[np.int_]:
@@ -135,10 +122,10 @@ def _scanned(
 
     there = places(tried)
     first = np.all(there % 2 == 0, axis=1)
-    found = _best(ground, list(itertools.compress(tried, first.tolist())), strengths, len(tried))
-    steps = np.abs(there[:, None] - places(found[:BESIDE])).max(axis=2)
+    found = _best(ground, itertools.compress(tried, first.tolist()))
+    steps = np.abs(there[:, None] - places(found[:FINALISTS])).max(axis=2)
     beside = np.any(steps <= 1, axis=1) & ~first
-    others = _best(ground, list(itertools.compress(tried, beside.tolist())), strengths, len(tried))
+    others = _best(ground, itertools.compress(tried, beside.tolist()))
     return sorted((*found, *others), key=lambda s: s.squared_error)
 
 
@@ -146,10 +133,8 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
     """The first of some starts, and the next that shares no value of its shape, where one does.
 
     The linear step ranks stiffnesses poorly where all are far off; each may lead to another fit.
-    One that is much further off than the first does not.
     """
-    near = (s for s in found[1:] if s.squared_error < FURTHER * found[0].squared_error)
-    others = (s for s in near if not s.shape.items() & found[0].shape.items())
+    others = (s for s in found[1:] if not s.shape.items() & found[0].shape.items())
     return [found[0], *itertools.islice(others, REFINED_STARTS - 1)]
 
 
@@ -206,14 +191,16 @@ def _basis(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
     return orthonormal(rows[:, columns])
 
 
-def _try(ground: _Ground, shape: dict[str, float], strengths: Sequence[Parameter]) -> Start:
+def _try(ground: _Ground, shape: dict[str, float]) -> Start:
     """Best strengths at one shape, by a linear step with the base parameters free."""
     effect = ground.effect
     values = {**effect.starts(ground.excitation), **shape}
     clipped = {p.name: float(min(max(values[p.name], p.lower), p.upper)) for p in effect.parameters}
     first = Fitted.at_start(effect, clipped)
     axis = ground.rest.with_effect(first)
-    where = [ParameterReference(effect.name, p) for p in strengths if p.name not in first.fixed]
+    where = [
+        ParameterReference(effect.name, p) for p in effect.strengths if p.name not in first.fixed
+    ]
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
     force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
     # A reading's error changes the other forces too, but only to second order.
@@ -246,14 +233,8 @@ def _bounded_step(
             return np.clip(step, low, high) / norms
         factor = np.linalg.cholesky(normal).T.astype(float)
         aim = np.linalg.solve(factor.T, wanted)
-        step = minimise(
-            lambda x: factor @ x - aim, lambda x: factor, step, (low, high),
-            tolerance=EXACT, most_evaluations=MOST_STEPS,
-        ).x  # fmt: skip
+        step = minimise(lambda x: factor @ x - aim, lambda x: factor, step, (low, high)).x
     return np.asarray(step / norms)
-
-
-BETTER = 0.99  # part of the error that a new start must reach to be taken
 
 
 def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = None) -> Fit:

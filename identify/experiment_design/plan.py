@@ -10,7 +10,7 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.test_function import require_test_function
-from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.alignment import fit_aligned
 from identify.estimation.variable_projection import usable
 from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (

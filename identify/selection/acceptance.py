@@ -28,15 +28,13 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
-from identify.estimation.fit import Fit
-from identify.estimation.fit_problem import has_nonparametric, smoothing
+from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
-from identify.estimation.splines import solve
+from identify.estimation.least_squares import solve
 from identify.rules import RULE
 
 Array = NDArray[np.float64]
 
-RIDGE = 1e-4  # keeps cross-validation finite for parameters that the motion does not excite
 TINY = np.finfo(float).tiny  # N^2, of a residual that is nothing
 
 
@@ -129,8 +127,8 @@ class Judged:
         fit, logs = self.fit, self.dataset.holdout
         if not logs:
             columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
-            weak, rows = RIDGE * np.linalg.norm(columns, axis=0), self._smoothing
-            left = left_out(fit.residual, columns, weak, penalty=rows.T @ rows)
+            rows = self._smoothing
+            left = left_out(fit.residual, columns, rows.T @ rows)
             out[fit.kept] = left / fit.lessened
             return out
         kept = moving(logs, sticks(fit.axis))

@@ -12,6 +12,7 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import noise_beside
+from identify.estimation.alignment import depends_on_time_origin, phases_found
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -24,7 +25,6 @@ from identify.estimation.evidence import (
 from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
-from identify.estimation.time_origin import depends_on_time_origin, phases_found
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect

@@ -21,7 +21,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sti
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.least_squares import orthonormal
+from identify.estimation.least_squares import RIDGE, ROUNDING, orthonormal
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
@@ -34,8 +34,6 @@ SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 STRETCHES = 8  # of a log, each with a sign of its own
 SAME = 0.5  # of the square of shifted columns, from which they are in the span of the true ones
 COMPARED = 4  # shifts by which that is told
-RIDGE = 1e-4  # of a column's length, which keeps what the motion does not excite finite
-ROUNDING = 1e-12  # of a squared force, below which its remainder is not told
 TINY = np.finfo(float).tiny  # of what is nothing, as a column where the motion excites none
 
 

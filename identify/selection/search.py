@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.channel_delay import realigned
+from identify.estimation.alignment import realigned, synchronised, time_origins, with_given_origins
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.least_squares import unabsorbed
-from identify.estimation.time_origin import synchronised, time_origins, with_given_origins
 from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, score

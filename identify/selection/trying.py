@@ -11,7 +11,7 @@ from functools import partial
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise
-from identify.estimation.channel_delay import moved_by
+from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
-from identify.estimation.channel_delay import aligned
+from identify.estimation.alignment import aligned
 from identify.estimation.force_balance import effect_forces, residual
 from identify.validation.free_run import free_run
 from twin.errors import InputError

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.estimation.channel_delay import fit_aligned, realigned
+from identify.estimation.alignment import fit_aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
 from identify.output.numbers import spaced

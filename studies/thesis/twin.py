@@ -2,7 +2,7 @@
 
 Fits of both must agree within their uncertainties, and the closed loops must move alike. Of a
 machine that was changed the comparison must say what changed. The machine is simulated, stepped ten
-times finer than its twin; ``identify.analysis.following`` takes the log of a real one.
+times finer than its twin; ``studies.thesis.following`` takes the log of a real one.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.analysis.following import closed_loop_errors, identified, twin_of
 from identify.output.as_json import json_of
 from identify.output.words.fit import agreement_in_words, causes_in_words, difference_in_words
 from identify.validation.agreement import Agreement, agreement
 from studies.drawing import BLUE, GREY
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
+from studies.thesis.following import closed_loop_errors, identified, twin_of
 from studies.thesis.study import CATALOGUE, Found
 from twin.model.machine import Fitted, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator

@@ -12,7 +12,7 @@ from machines import one_axis
 
 from identify.dataset.dataset import Role
 from identify.dataset.preparation import datasets
-from identify.estimation.channel_delay import realigned
+from identify.estimation.alignment import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on
 from identify.output.as_json import json_of

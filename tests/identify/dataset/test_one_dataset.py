@@ -15,7 +15,7 @@ from identify.analysis.first_model import first_model
 from identify.dataset.dataset import by_log
 from identify.dataset.given_logs import share_samples
 from identify.dataset.preparation import datasets
-from identify.estimation.channel_delay import aligned
+from identify.estimation.alignment import aligned
 from identify.output.as_json import json_of
 from identify.output.text import fit_text
 from identify.validation.comparison import AxisComparison

@@ -12,7 +12,7 @@ from constructed import log_of, waves
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import moving
-from identify.estimation.channel_delay import realigned
+from identify.estimation.alignment import realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on, fit_axis
 from identify.output.words.fit import prepared_in_words

@@ -60,6 +60,11 @@ def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
     assert found.refitted < 0.2 * found.given
     assert first.alike == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
     assert label in str(refit_in_words(found))
+    forces = [change.force for change in found.changes]
+    assert forces == sorted(forces, reverse=True)
+    assert len(forces) <= 3
+    assert forces[-1] > 0.1 * found.given
+    assert forces[0] == pytest.approx((found.given**2 - found.refitted**2) ** 0.5, rel=0.1)
 
 
 def test_a_model_with_the_machines_values_is_not_complained_of() -> None:

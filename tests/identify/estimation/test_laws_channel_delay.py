@@ -7,7 +7,7 @@ import pytest
 from constructed import dataset_of, effect, fit_of, log_of, waves, windowed
 
 from identify.dataset.motion import motion_of
-from identify.estimation.channel_delay import fit_aligned, misalignment, moved_by, realigned
+from identify.estimation.alignment import fit_aligned, misalignment, moved_by, realigned
 from identify.estimation.fit import fit_axis
 from identify.output.words.fit import channel_delay_in_words
 from identify.rules import RULE
@@ -99,7 +99,7 @@ def test_a_shift_is_said_in_samples():
     log = aligned(0.0)
     assert channel_delay_in_words(dataset_of(log)) is None
     said = channel_delay_in_words(dataset_of(log, channel_delay=1.5e-3))
-    assert said.startswith("axis x: the force acts 1500 µs (1.50 samples) before")
+    assert said.startswith("the force acts 1500 µs (1.50 samples) before")
     half = channel_delay_in_words(dataset_of(log, channel_delay=0.53 * log.motion.sample_period))
     assert "(0.53 samples)" in half
     assert "read at the same instant" in half

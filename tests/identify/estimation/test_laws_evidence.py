@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from linear_cases import coloured, cut, linear, without
+from scipy.special import stdtrit
 from scipy.stats import norm
 
 from identify.estimation.evidence import (
@@ -12,7 +13,9 @@ from identify.estimation.evidence import (
     held_out_gain,
     left_out,
     noise_gain,
+    students_t,
 )
+from identify.estimation.least_squares import RIDGE
 
 RNG = np.random.default_rng(21)
 
@@ -84,21 +87,22 @@ def test_a_noise_gain_is_that_of_the_normal_likelihood():
     assert noise_gain(r, 0.7, 1.2) == pytest.approx(2.0 * (both[1] - both[0]))
 
 
-@pytest.mark.parametrize("blocks", [7, 24])
-def test_a_left_out_residual_is_that_of_a_fit_that_has_not_seen_it(blocks):
-    columns, data, at = linear(1)
-    found = left_out(columns @ at - data, columns, np.zeros(3), blocks)
-    for block in cut(len(data), blocks):
-        again = without(columns, data, block)
-        np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-9)
-
-
-def test_priors_count_in_a_left_out_residual():
-    columns, data, _ = linear(2)
-    scale = np.array([4.0, 200.0, 0.1])
-    rows, wanted = np.vstack([columns, np.diag(scale)]), np.concatenate([data, np.zeros(3)])
+@pytest.mark.parametrize("smoothed", [False, True])
+def test_a_left_out_residual_is_that_of_a_fit_that_has_not_seen_it(smoothed):
+    columns, data, _ = linear(1)
+    weak = RIDGE * np.diag(np.linalg.norm(columns, axis=0))
+    weight = np.diag([4.0, 200.0, 0.1]) * smoothed
+    rows, wanted = np.vstack([columns, weak, weight]), np.concatenate([data, np.zeros(6)])
     at = np.linalg.lstsq(rows, wanted, rcond=None)[0]
-    found = left_out(columns @ at - data, columns, scale, 9)
-    for block in cut(len(data), 9):
+    found = left_out(columns @ at - data, columns, weight**2)
+    for block in cut(len(data), BLOCKS):
         again = without(rows, wanted, block)
-        np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-9)
+        np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-6)
+
+
+@pytest.mark.parametrize("freedom", [8, 9, 23, 100])
+def test_the_quantile_of_students_t_is_scipys(freedom):
+    for chance in (0.05, 0.01):
+        assert students_t(chance, freedom) == pytest.approx(
+            stdtrit(freedom, 1.0 - chance), rel=1e-3
+        )

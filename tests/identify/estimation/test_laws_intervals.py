@@ -8,8 +8,8 @@ import pytest
 from built_fits import PLAIN, built_fit, known_floor
 from constructed import effect, fit_of, moved, windowed
 from linear_cases import cut, linear, without
-from scipy.special import stdtrit  # scipy.stats takes half a second to load
 
+from identify.estimation.evidence import BLOCKS, students_t
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import (
     INSEPARABLE,
@@ -36,10 +36,10 @@ class Stub(SimpleNamespace):
 
 
 def jackknife(columns, data, at) -> np.ndarray:
-    """Half widths of 90 % by leaving one block of 30 out, by refitting."""
-    moves = [without(columns, data, b) - at for b in cut(len(data), 30)]
-    spread = np.sqrt(29.0 / 30.0 * np.sum(np.square(moves), axis=0))
-    return stdtrit(29, 0.95) * spread
+    """Half widths of 90 % by leaving one block out, by refitting."""
+    moves = [without(columns, data, b) - at for b in cut(len(data), BLOCKS)]
+    spread = np.sqrt((1.0 - 1.0 / BLOCKS) * np.sum(np.square(moves), axis=0))
+    return students_t(0.05, BLOCKS - 1) * spread
 
 
 def by_influence(columns, data, at) -> np.ndarray:
@@ -57,7 +57,7 @@ def by_influence(columns, data, at) -> np.ndarray:
         left = (data - columns @ at)[order]
         parts = list(zip(np.split(own[order], ends), np.split(left, ends), strict=True))
         moved = [(o @ r) ** 2 / (1.0 - (o @ o) / (own @ own)) for o, r in parts]
-        out.append(stdtrit(9, 0.95) * np.sqrt(np.sum(moved)) / (own @ own))
+        out.append(students_t(0.05, 9) * np.sqrt(np.sum(moved)) / (own @ own))
     return np.array(out)
 
 
@@ -92,10 +92,12 @@ def test_what_a_prior_or_bound_shifts_is_in_the_interval():
         fit = Stub(jacobian=columns, residual=columns @ held - data)
         found = half_widths(fit)
         moves = []
-        for b in cut(len(data), 30):
+        for b in cut(len(data), BLOCKS):
             rest = columns.T @ columns - columns[b].T @ columns[b]
             moves.append(np.linalg.solve(rest, columns[b].T @ fit.residual[b]))
-        spread = stdtrit(29, 0.95) * np.sqrt(29.0 / 30.0 * np.sum(np.square(moves), axis=0))
+        spread = students_t(0.05, BLOCKS - 1) * np.sqrt(
+            (1.0 - 1.0 / BLOCKS) * np.sum(np.square(moves), axis=0)
+        )
         spread = np.maximum(spread, by_influence(columns, data, held))
         np.testing.assert_allclose(found, spread + np.abs(off), rtol=1e-5)
         assert (found > np.abs(off)).all()

@@ -82,13 +82,13 @@ def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effe
 
 
 def test_where_nothing_gains_more_than_chance_one_start_is_enough():
-    dataset = planted("cogging")
-    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["cogging"])
+    dataset = planted("end_stop")
+    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["end_stop"])
     assert len(found) == 1
 
 
 def test_a_wave_longer_than_the_logs_can_show_is_no_start():
-    dataset = planted("cogging", p=0.09, a1=0.3)  # m; the travel is 0.1 m
+    dataset = planted("cogging", p=0.035, a1=0.3)  # m; the travel is 0.1 m
     base = fit_axis(PLAIN, dataset.fit)
     position = np.concatenate([log.motion.position for log in dataset.fit])
     longest = np.ptp(position) / FEWEST_CYCLES

@@ -9,9 +9,7 @@ from machines import one_axis
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
-from identify.estimation.fit import fit_axis
-from identify.estimation.force_balance import residual
-from identify.estimation.time_origin import (
+from identify.estimation.alignment import (
     depends_on_time_origin,
     phases_found,
     synchronised,
@@ -19,6 +17,8 @@ from identify.estimation.time_origin import (
     with_time_origins,
     without_timed_forces,
 )
+from identify.estimation.fit import fit_axis
+from identify.estimation.force_balance import residual
 from identify.rules import RULE
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from identify.selection.trying import try_effect

@@ -175,7 +175,7 @@ def test_what_is_no_number_is_null_and_numbers_stay_what_they_are() -> None:
 
 # What runs compiled laws over logs, fits, or tells a noise floor.
 COMPUTES = (
-    "identify.estimation.force_balance", "identify.estimation.fit_problem",
+    "identify.estimation.force_balance", "identify.estimation.least_squares",
     "identify.estimation.intervals", "identify.dataset.noise_floor",
     "identify.validation.free_run", "identify.estimation.confounded", "twin.core",
 )  # fmt: skip

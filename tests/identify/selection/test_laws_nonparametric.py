@@ -12,14 +12,8 @@ from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, built_machine, 
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian
-from identify.estimation.splines import (
-    RIDGE,
-    ROUNDING,
-    STIFFNESS,
-    Linearised,
-    choose_stiffness,
-    solve,
-)
+from identify.estimation.least_squares import RIDGE, ROUNDING, solve
+from identify.estimation.splines import STIFFNESS, Linearised, choose_stiffness
 from identify.output.words.fit import nonparametric_in_words
 from identify.selection.nonparametric import (
     _filled,

@@ -1,7 +1,12 @@
-"""When each log began, by the phase of what repeats in time whatever the axis does.
+"""When force and position of one sample were: the channel delay, and when each log began.
+
+A command that acts later than its time stamp is a physical delay, for which the catalogue has
+effects. One that seems to act earlier is not physical: the time stamps of the channels disagree, or
+the log holds every n-th sample of a faster controller, whose mean force is earlier than the logged
+sample. Such a delay is removed from the log and reported.
 
 A pump or a fan runs on while logs are started at any moment: its force has one frequency in all
-logs, and in each a phase of its own.
+logs, and in each a phase of its own. By that phase the time origins of the logs are set.
 """
 
 from __future__ import annotations
@@ -14,17 +19,96 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectrum import lines_in_time
-from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import Fit
+from identify.estimation.evidence import effective_samples, evidence, rms
+from identify.estimation.fit import LINES, Fit, Outcome, finished, fit_axis
 from identify.estimation.force_balance import averaged_force, residual
+from identify.estimation.least_squares import ROUNDING, unabsorbed
+from identify.estimation.residual_dependence import SAME_PERIOD
+from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
-TRIED = 6  # frequencies at which the residual repeats
-LATER = 1e-3  # s, by which a clock is moved to see what reads it
-SAME = 0.02  # of a period, within which clocks agree
+
+def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
+    """The fit of an axis, and the dataset with its channel delay removed.
+
+    The time origins of its logs are set by the phase of what repeats in time.
+    """
+    fit = fit_multistart(axis, dataset)
+    while shift := misalignment(fit, dataset):
+        moved = realigned(dataset, dataset.channel_delay + shift)
+        again = fit_multistart(fit.axis, moved, fit.begun)
+        if again.error > RULE.fallen * fit.error:
+            break
+        dataset, fit = moved, again
+    if not depends_on_time_origin(fit.axis, dataset):
+        return synchronised(fit, dataset)
+    dataset = with_time_origins(fit.axis, dataset)
+    return dataset, fit_multistart(fit.axis, dataset, fit.begun)
+
+
+def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
+    """The dataset with the channel delay and the time origins that a model with these values finds.
+
+    No parameter is fitted; ``fit_aligned`` does the same together with a fit.
+    """
+    fit = finished(axis, axis, dataset.fit, Outcome.CONVERGED)
+    while len(fit.residual) and (shift := misalignment(fit, dataset)):
+        moved = realigned(dataset, dataset.channel_delay + shift)
+        again = finished(axis, axis, moved.fit, Outcome.CONVERGED)
+        if again.error > RULE.fallen * fit.error:
+            break
+        dataset, fit = moved, again
+    return with_time_origins(axis, dataset)
+
+
+def misalignment(fit: Fit, dataset: Dataset) -> float:
+    """How much earlier than its time stamp the force seems to act, s; 0 without evidence for it.
+
+    One linear step: the residual regressed on the rate of the command, beside the parameters of the
+    fit. Where the dataset has a channel delay already, the result is the change of it; the delay as
+    a whole is never negative.
+    """
+    rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.fit])[fit.kept]
+    left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
+    power = float(own @ own)
+    if power <= ROUNDING * float(rate @ rate):
+        return 0.0
+    shift = -float(own @ left) / power
+    after = left + shift * own
+    fallen = rms(after) < RULE.fallen * rms(left)
+    samples = (dataset.channel_delay + shift) / max(w.motion.sample_period for w in dataset.fit)
+    possible = RULE.least_shift < samples < RULE.most_shift
+    told = possible and fallen and evidence(left, after, 1).delta_bic > RULE.least_bic
+    return shift if told else 0.0
+
+
+def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
+    """The dataset with the channel delay that a larger model finds, or None if it is the same.
+
+    An effect that the smaller model lacked may have looked like a delay, or hidden one.
+    """
+    if ahead := misalignment(fit, dataset):
+        return realigned(dataset, dataset.channel_delay + ahead)
+    if dataset.channel_delay == 0.0:
+        return None
+    back = realigned(dataset, 0.0)
+    return back if fit_axis(fit.axis, back.fit).error < RULE.fallen * fit.error else None
+
+
+def realigned(dataset: Dataset, shift: float) -> Dataset:
+    """The dataset with a channel delay of ``shift`` (s) removed, counted from the original logs."""
+    more = shift - dataset.channel_delay
+    moved = dataset.with_logs(
+        replace(
+            PreparedLog.of(w.motion.with_force_ahead(more), w.test_function.length, w.reach),
+            force_noise=w.force_noise,
+        )
+        for w in dataset.logs
+    )
+    return replace(moved, channel_delay=shift)
 
 
 def with_time_origins(axis: AxisModel, dataset: Dataset) -> Dataset:
@@ -46,7 +130,7 @@ def with_time_origins(axis: AxisModel, dataset: Dataset) -> Dataset:
     phases = np.angle([_amplitude(log.time, left, frequency) for log, left in pairs])
     turns = (phases - phase) / (2.0 * np.pi)
     turns -= np.rint(turns)
-    turns[np.abs(turns) < SAME] = 0.0
+    turns[np.abs(turns) < SAME_PERIOD] = 0.0
     pairs = zip(logs, turns / frequency, strict=True)
     return dataset.with_logs(_set(log, float(c)) for log, c in pairs)
 
@@ -88,7 +172,7 @@ def phases_found(axis: AxisModel, effect: str, dataset: Dataset) -> int:
 
 def without_timed_forces(axis: AxisModel, log: PreparedLog) -> AxisModel:
     """The axis less the physical forces that read the clock."""
-    later = _set(log, log.motion.time_origin + LATER)
+    later = _set(log, log.motion.time_origin + log.motion.period)
     for fitted in axis.effects:
         if fitted.effect.kind is Kind.FORCE and not fitted.effect.is_nonparametric:
             alone = replace(axis, effects=(fitted,))
@@ -125,7 +209,7 @@ def _common_line(logs: Sequence[PreparedLog], left: Sequence[Array]) -> tuple[fl
     None where it may be chance.
     """
     steps = [log.test_function.stride * log.test_function.period for log in logs]
-    tried = lines_in_time(list(zip(left, steps, strict=True)), most=TRIED)
+    tried = lines_in_time(list(zip(left, steps, strict=True)), most=LINES)
     if not tried:
         return None
 
@@ -137,7 +221,7 @@ def _common_line(logs: Sequence[PreparedLog], left: Sequence[Array]) -> tuple[fl
 
     best = max(tried, key=explained)
     every = np.concatenate(left)
-    gain = -np.log(max(1.0 - explained(best) / float(np.sum(every**2)), 1e-12))
+    gain = -np.log(max(1.0 - explained(best) / float(np.sum(every**2)), ROUNDING))
     samples = effective_samples(every)
     told = samples * gain - 2 * len(logs) * np.log(samples) > RULE.least_bic
     return (best, float(np.angle(_amplitude(logs[0].time, left[0], best)))) if told else None

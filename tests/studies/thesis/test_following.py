@@ -9,9 +9,9 @@ import pytest
 from built_fits import HARDWARE, axis_of, fitted
 from constructed import log_of
 
-from identify.analysis.following import closed_loop_errors, identified, twin_of
 from identify.dataset.motion import motion_of
 from identify.testing import assert_agree
+from studies.thesis.following import closed_loop_errors, identified, twin_of
 from twin.experiments.named import simulate
 from twin.model.machine import MachineModel
 from twin.simulator import ReducedSimulator

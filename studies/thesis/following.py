@@ -13,7 +13,7 @@ import numpy as np
 
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
-from identify.estimation.channel_delay import fit_aligned
+from identify.estimation.alignment import fit_aligned
 from identify.estimation.intervals import scatter
 from twin.core.control import Controller
 from twin.experiments.follow import replay

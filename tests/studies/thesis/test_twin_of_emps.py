@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from identify.analysis.following import closed_loop_errors, identified, twin_of
 from identify.testing import assert_agree
 from identify.workflow import agree
+from studies.thesis.following import closed_loop_errors, identified, twin_of
 from twin.core.control import Controller
 from twin.effects import load_catalogue
 from twin.experiments.follow import recorded_setpoint
