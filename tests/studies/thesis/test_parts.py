@@ -10,7 +10,6 @@ from built_fits import CATALOGUE, HARDWARE, axis_of, fitted
 
 from identify.analysis.friction_curve import StribeckCurve
 from identify.analysis.velocity_map import VelocityMap
-from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import force_along
 from studies.thesis import (
     behaviours,
@@ -21,13 +20,11 @@ from studies.thesis import (
     simulation,
     study,
     track,
-    twin,
 )
 from studies.thesis.mixed_friction import PARTS, mixed
 from twin.effect import Kind
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import free_parameters
 
 TRACK, _, STAGE = study.machine("track")
 OLD, _, AGING = study.machine("aging")
@@ -128,35 +125,6 @@ def test_a_law_that_remembers_closes_its_inner_loop_and_dahls_does_not() -> None
     assert nested.gap == abs(nested.friction[3 * leg - 1] - nested.friction[8 * leg - 1])
 
 
-def test_random_starts_are_drawn_within_three_times_and_the_bounds() -> None:
-    start, rng = study.friction_of(STAGE), np.random.default_rng(3)
-    drawn = [models.drawn(start, rng).values for _ in range(60)]
-    for p in start.effect.parameters:
-        values, first = np.array([d[p.name] for d in drawn]), start.values[p.name]
-        if p.name in start.fixed or p.fixed:
-            assert np.all(values == first)
-        else:
-            assert np.all((values >= p.lower) & (values <= p.upper))
-            assert np.all(values <= 3.0 * first * (1 + 1e-12))
-            assert np.ptp(values) > 0.5 * first
-            if not p.at_least:  # as often less as more
-                assert np.median(values) == pytest.approx(first, rel=0.5)
-    assert all(d["Fs"] >= d["Fc"] for d in drawn)
-
-
-def test_the_dry_part_of_the_drawn_friction_is_scaled_by_one_factor() -> None:
-    model, name, axis = study.machine("proton_xy")
-    drawn = twin.drawn(model, name, np.random.default_rng(5)).axes[name]
-    before, after = (study.friction_of(a) for a in (axis, drawn))
-    dry = {p.name for p in before.effect.parameters if p.dry}
-    ratios = {k: after.values[k] / v for k, v in before.values.items() if v}
-    factor = np.random.default_rng(5).uniform(0.8, 1.25)
-    assert ratios == pytest.approx({k: factor if k in dry else 1.0 for k in ratios})
-    assert drawn.mass == axis.mass
-    others = [f for f in drawn.effects if f.effect.kind is not Kind.FRICTION]
-    assert others == [f for f in axis.effects if f.effect.kind is not Kind.FRICTION]
-
-
 # --- simulation, track, future --------------------------------------------------------------
 
 
@@ -196,32 +164,6 @@ def test_the_curve_planted_at_a_place_is_that_of_its_level(way: float) -> None:
     assert np.all(np.abs(values / expected - 1.0) < [5e-3, 5e-3, 2e-2, 0.05])
 
 
-def test_at_one_place_friction_and_its_direction_are_fitted_and_the_rest_is_known() -> None:
-    """What varies along the track is a slope there; spikes repeat and are not at the places.
-
-    Brisk moves are repeated, and those that are too fast left out.
-    """
-    logs = track.moves(TRACK, "x", 0.0, True, np.random.default_rng(0))
-    assert list(logs) == [f"{v:g} m/s" for v in track.FEW]
-    motions = [motion_of(log, "x", label, ripples=()) for label, log in logs.items()]
-    found = VelocityMap.joined([VelocityMap.of(STAGE, motion) for motion in motions])
-    assert len(found) == 2 * (2 * 1 + 4 * 2)
-    assert found.position == pytest.approx(0.0, abs=0.006)
-    axis = track.local_fit(TRACK, "x", logs, found).axis
-    assert set(axis.names) == {"lugre", "cable_slab", "position_dependent_friction",
-                               "asymmetric_friction"}  # fmt: skip
-    free = {c.label for c in free_parameters(axis)}
-    dynamic_part = {f"lugre.{n}" for n in ("Fc", "Fs", "v0", "sigma2", "sigma0", "sigma1")}
-    assert free == dynamic_part | {"position_dependent_friction.c1", "asymmetric_friction.coulomb",
-                                   "asymmetric_friction.viscous"}  # fmt: skip
-    assert axis["cable_slab"].values == STAGE["cable_slab"].values
-    own, true = (track.curve_at(a, 0.0, np.array(track.FEW)) for a in (axis, STAGE))
-    assert own[:2] == pytest.approx(true[:2], rel=3e-3)
-    slower = replace(STAGE, hardware=replace(STAGE.hardware, velocity=0.05 / track.FASTEST))
-    few = track.moves(TRACK.with_axis("x", slower), "x", 0.0, True, np.random.default_rng(0))
-    assert list(few) == list(logs)[:-1]
-
-
 def test_the_level_that_a_machine_had_is_that_of_its_states() -> None:
     """Wear multiplies by 1 + 0.002 s, heat by exp(-0.05 E); a state is read every 100 samples."""
     assert [f.effect.name for f in AGING.effects if future.ages(f)] == ["wear", "thermal_drift"]
@@ -232,25 +174,3 @@ def test_the_level_that_a_machine_had_is_that_of_its_states() -> None:
     s, heat = states["wear_distance"][at], states["thermal_drift_heat"][at]
     expected = 0.335 * np.mean((1.0 + 0.002 * s) * np.exp(-0.05 * heat))
     assert future.true_level(AGING, states, "Fs") == pytest.approx(expected)
-
-
-def test_a_drift_is_the_slope_of_the_second_half_over_the_distance() -> None:
-    """A short run of the machine without what ages it: its level is found, and stays."""
-    young = replace(AGING, effects=tuple(f for f in AGING.effects if not future.ages(f)))
-    machine = OLD.with_axis("x", young)
-    log = study.recorded(machine, "tracking", np.random.default_rng(2), 60.0)
-    found = future.drift(machine, young, log)
-    assert len(found["found"]) == 6
-    np.testing.assert_allclose(found["true"], 0.285)
-    assert np.all(np.abs(found["found"] - 0.285) < 2.0 * found["half_width_90"])
-    assert np.all(np.diff(found["distance"]) > 0.0)
-    late = slice(3, None)
-    slope, _ = np.polyfit(found["distance"][late], found["found"][late], 1,
-                          w=1.0 / found["half_width_90"][late])  # fmt: skip
-    assert found["slope"] == pytest.approx(slope)
-    assert not found["detected"]
-    assert "does not drift in its second half" in future.drift_in_words(found)
-    aged = {**found, "slope": 0.01, "slope_standard_error": 0.001, "detected": True}
-    assert future.drift_in_words(aged) == (
-        "drifts in its second half: 0.01 +- 0.001 N/m (standard error)"
-    )
