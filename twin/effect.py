@@ -119,8 +119,6 @@ class Parameter:
     """A better start value, in ``unit``, from the motion of the logs."""
     scan: Callable[[Excitation], Sequence[float]] | None = None
     """Values (k,), in ``unit``, that a diagnosis tries, from the motion of the logs."""
-    screened: bool = True
-    """Whether a strength is fitted while shapes are scanned; one of minor weight need not be."""
     period: bool = False
     """Whether it is a length (m) after which the force repeats along the track."""
     dry: bool = False

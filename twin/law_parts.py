@@ -167,11 +167,10 @@ def columns_of(io, waves):
 
 
 def harmonic_terms(count: int, unit: str, most: float = MOST) -> tuple[Parameter, ...]:
-    """``a_k`` and ``b_k`` of so many harmonics; a scan fits those of the first."""
+    """``a_k`` and ``b_k`` of so many harmonics."""
     return tuple(
         Parameter(
-            f"{c}{k}", unit, 0.0, -most, most, f"{f} term of harmonic {k}", strength=True,
-            screened=k == 1,
+            f"{c}{k}", unit, 0.0, -most, most, f"{f} term of harmonic {k}", strength=True
         )
         for k in range(1, count + 1)
         for c, f in (("a", "sine"), ("b", "cosine"))

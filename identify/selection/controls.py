@@ -22,6 +22,7 @@ from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import RIDGE, ROUNDING, orthonormal
+from identify.estimation.residual_noise import SHIFTS
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
@@ -30,7 +31,6 @@ Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 Falsify = Callable[[Array, np.random.Generator], Array]
 
-SHIFTS = (0.1, 0.9)  # of a log, by which columns are shifted
 STRETCHES = 8  # of a log, each with a sign of its own
 SAME = 0.5  # of the square of shifted columns, from which they are in the span of the true ones
 COMPARED = 4  # shifts by which that is told

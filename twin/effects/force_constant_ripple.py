@@ -6,8 +6,6 @@ it: C. Rohrig, A. Jochheim, "Identification and compensation of force ripple in 
 magnet motors", Proc. American Control Conference 2001.
 """
 
-from dataclasses import replace
-
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U, X
 from twin.law_parts import harmonic_terms, harmonics, pitches_to_try
 
@@ -30,7 +28,7 @@ EFFECT = Effect(
             "p", "m", 0.024, LEAST, MOST, "magnet pitch", period=True,
             scan=lambda e: pitches_to_try(e.thrust_pitches, e.travel, 2, CYCLES),
         ),
-        *(replace(term, screened=True) for term in harmonic_terms(2, "1", 0.5)),
+        *harmonic_terms(2, "1", 0.5),
     ),
     law=law,
     several=True,

@@ -67,18 +67,6 @@ def test_all_but_a_friction_is_absent_at_its_start() -> None:
         assert effect.is_present(effect.starts(LOG)) == (friction or read_off)
 
 
-def test_of_harmonics_the_first_alone_is_screened() -> None:
-    """A scan tries every shape with the screened strengths; the others come with the best."""
-    numbered = [
-        (f"{e.name}.{p.name}", p.screened, int(p.name[1:]))
-        for e, p in PARAMETERS
-        if not all(q.screened for q in e.strengths) and p in e.strengths
-    ]
-    assert {number for _, _, number in numbered} >= {1, 2}
-    for name, screened, number in numbered:
-        assert screened == (number == 1), name
-
-
 @pytest.mark.parametrize(
     ("low", "high", "push", "itself"),
     [(0.04, 0.0, 0.5, True), (0.0, 0.04, 0.5, True), (0.04, 0.04, 0.5, True),
