@@ -37,6 +37,7 @@ _Walk: TypeAlias = tuple[list[int], _Along]
 
 STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
 LEAST_PART = 1e-3  # of what is usual, by which a smaller value is stepped as if it were that large
+SHARPENED = 2  # times that a load is made to have the means by test functions that it is of
 AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 
 
@@ -111,7 +112,11 @@ def _load(axis: AxisModel, log: PreparedLog) -> Array:
     rest = replace(axis, effects=tuple(f for f in acting if f.effect.name not in loaded))
     bodies = log.fine.mean(log.motion.raw[1]) - log.command
     asked = axis.mass * log.acceleration - averaged_force(rest, [log]) + bodies
-    return np.interp(log.motion.time, log.time, asked)
+    load = np.interp(log.motion.time, log.time, asked)
+    for _ in range(SHARPENED):  # the means smooth it
+        short = asked - log.test_function.mean(load)
+        load += np.interp(log.motion.time, log.time, short)
+    return load
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:

@@ -178,7 +178,8 @@ def inseparable(fit: Fit) -> dict[str, str]:
     excited = np.flatnonzero(norms > 0)
     columns = fit.jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=EXACT, hermitian=True)
-    spread = np.sqrt(np.diag(inverse))
+    told = np.diag(inverse)
+    spread = np.sqrt(np.maximum(told, np.finfo(float).eps * told.max(initial=1.0)))  # of rounding
     correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))
     labels = [fit.scaling.where[i].label for i in excited]
     return {

@@ -51,8 +51,8 @@ def test_what_differs_is_named_with_its_size_and_the_effects_that_would_make_it(
     mass = next(d for d in found.differing if d.label == "mass")
     assert mass.b - mass.a == pytest.approx(0.5)
     assert mass.ratio == pytest.approx(0.5 / mass.standard_error)
-    # Half widths of 1 % of 10 kg and of 10.5 kg, 1.699 standard errors each.
-    assert mass.standard_error == pytest.approx((0.1001**2 + 0.1051**2) ** 0.5 / 1.699, rel=1e-3)
+    # Half widths of 1 % of 10 kg and of 10.5 kg, 1.714 standard errors each (Student's t of 23).
+    assert mass.standard_error == pytest.approx((0.1001**2 + 0.1051**2) ** 0.5 / 1.714, rel=1e-3)
     assert {c.effect for c in found.causes} == {"payload_mass", "constant_force"}
     assert sum(c.share for c in found.causes) == pytest.approx(1.0, abs=1e-6)
 
