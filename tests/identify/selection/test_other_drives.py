@@ -1,4 +1,4 @@
-"""Drives that have nothing of the stage, from their logs alone (benchmarks/second_simulator/drives)."""
+"""Drives that have nothing of the stage, from their logs alone (benchmarks/drives.py)."""
 
 from __future__ import annotations
 
