@@ -79,10 +79,11 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     """Force of each effect along a measured motion, (n,) N; of an actuation what it changed."""
     table = axis_table({"x": AxisModel(1.0, effects=tuple(effects))})
     rows = np.zeros((len(table.entries), len(motion)))
+    states = np.zeros(table.n_states + 1)  # a law on trial may write behind its own
     first, last, state, _, _ = table.axes[0]
     signals = np.stack([motion.x, motion.v, motion.u, motion.u, motion.v])  # load, another joint
     walk(
-        table.entries, first, last, table.parameters, np.zeros(table.n_states), state, signals,
+        table.entries, first, last, table.parameters, states, state, signals,
         signals, motion.dt, 0, rows, 1.0, 0.0,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
