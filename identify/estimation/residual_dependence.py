@@ -19,7 +19,7 @@ from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
 from identify.dataset.spectrum import Record, SpectralLine, find_lines
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import effective_samples
-from identify.estimation.fit import LINES, Fit
+from identify.estimation.fit import Fit
 from identify.rules import RULE
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array
@@ -166,7 +166,7 @@ def _strongest(records: Sequence[Record]) -> SpectralLine | None:
         return None
     lowest = RULE.fewest_cycles / span
     highest = max(len(r.values) for r in records) / (OVERLAP * span)
-    found = find_lines(records, lowest, highest, most=LINES, chance=RULE.line_chance)
+    found = find_lines(records, lowest, highest, chance=RULE.line_chance)
     return max(found, key=lambda line: line.share, default=None)
 
 

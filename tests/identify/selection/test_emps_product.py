@@ -128,7 +128,6 @@ def test_without_a_window_the_answer_is_the_same(model, emps):
     assert diagnose(model, *emps, catalogue=CATALOGUE).effect is CATALOGUE["asymmetric_friction"]
 
 
-@pytest.mark.xfail(strict=True, reason="since the pitches come from the finder of lines (0.6.0)")
 def test_the_term_of_a_screw_turn_is_present_in_each_run_but_not_general(found):
     repeat = found.leading.repeat
     assert repeat is not None
