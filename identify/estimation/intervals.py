@@ -24,7 +24,7 @@ import numpy as np
 from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
 from identify.estimation.fit import Fit, is_linear
 from identify.estimation.force_balance import STEP, changes
-from identify.estimation.least_squares import EXACT, ROUNDING
+from identify.estimation.least_squares import ROUNDING
 from identify.rules import RULE
 from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
@@ -177,9 +177,8 @@ def inseparable(fit: Fit) -> dict[str, str]:
     norms = np.linalg.norm(fit.jacobian, axis=0)
     excited = np.flatnonzero(norms > 0)
     columns = fit.jacobian[:, excited] / norms[excited]
-    inverse = np.linalg.pinv(columns.T @ columns, rcond=EXACT, hermitian=True)
-    told = np.diag(inverse)
-    spread = np.sqrt(np.maximum(told, np.finfo(float).eps * told.max(initial=1.0)))  # of rounding
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=ROUNDING, hermitian=True)
+    spread = np.sqrt(np.diag(inverse))
     correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))
     labels = [fit.scaling.where[i].label for i in excited]
     return {

@@ -70,7 +70,6 @@ def followed(fitted: MachineModel, log: Log, drive: dict) -> Log:
     return twin_of(fitted, log, setpoint=setpoint, controllers={"x": gains})
 
 
-@pytest.mark.xfail(strict=True, reason="what EMPS leaves is no noise since 0.6.0: no intervals")
 def test_the_fits_of_the_drive_and_of_its_twin_agree(model, fitted, record) -> None:
     twin = identified(model, followed(fitted, *record("DATA_EMPS")), WINDOW)
     assert_agree(fitted, twin)
