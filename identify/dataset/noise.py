@@ -43,6 +43,7 @@ HALF = 0.25  # of the sample rate: beyond, a command has no motion, a measured v
 LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 COHERENT = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
+SHOWN = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
 UNTOLD = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
 
 
@@ -154,7 +155,7 @@ def _folded(
         return 0.0, 0.0
     each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
     folded = max(coherence**2, 0.5) * float(each.mean())  # half, where every other is left out
-    if motion.command_noise <= UNTOLD * folded:
+    if level <= SHOWN * float(np.median(each)) or motion.command_noise <= UNTOLD * folded:
         return 0.0, 0.0
     return folded, float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
 

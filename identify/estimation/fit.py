@@ -14,12 +14,12 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.drive import forces_lessened
 from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
-from identify.dataset.spectrum import Record, find_lines, lines_in_time, strongest_line
-from identify.dataset.test_function import OVERLAP
+from identify.dataset.spectrum import lines_in_time
 from identify.estimation.evidence import SURE, effective_samples, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE, Scaling
+from identify.estimation.spatial_periods import spatial_periods
 from identify.rules import RULE
 from twin.curve import Part
 from twin.effect import Kind
@@ -127,14 +127,13 @@ class Fit:
 
     @cached_property
     def pitches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Periods (m) at which the residual repeats along the track, and the same times command.
-
-        The likeliest first, of what the free parameters cannot add themselves.
-        """
+        """Periods (m) at which the residual repeats along the track, and the same times command."""
         position = [log.test_function.mean(log.motion.position) for log in self.logs]
         command = [log.command for log in self.logs]
         place, thrust = (np.concatenate(parts)[self.kept] for parts in (position, command))
-        return _periods(place, self.unabsorbed), _periods(place, thrust * self.unabsorbed)
+        weights = np.ones(len(place)), thrust
+        plain, driven = (spatial_periods(place, self.residual, w, self.jacobian) for w in weights)
+        return plain, driven
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:
@@ -266,18 +265,6 @@ def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
     """The same, or None where there are none, or none that say anything of this model."""
     logs = dataset.having(role)
     return error_in(role, fit, dataset) if logs and moving(logs, sticks(fit.axis)).any() else None
-
-
-def _periods(place: Array, force: Array) -> tuple[float, ...]:
-    """Periods (m) at which a force (n,) N repeats over places (n,) m; likely by chance or not."""
-    span = float(np.ptp(place))
-    if span == 0.0 or not force.any():
-        return ()
-    record, lowest = Record(place, force), RULE.fewest_cycles / span
-    highest = len(place) / (OVERLAP * span)
-    found = find_lines([record], lowest, highest, most=LINES, chance=1.0)
-    frequencies = [line.frequency for line in found] or [strongest_line(record, lowest, highest)[0]]
-    return tuple(1.0 / f for f in frequencies)
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:

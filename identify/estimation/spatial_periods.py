@@ -1,0 +1,68 @@
+"""Spatial periods, at which what a model leaves of the force repeats along the track.
+
+Two looks. The least-squares gain of a sine in position beside the model's own parameters, for
+pitches half a cycle over the travel apart, which tells what a smooth remainder or the model itself
+would imitate; and spectral lines, which reach to pitches far below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identify.dataset.spectrum import Record, find_lines
+from identify.estimation.least_squares import orthonormal, unabsorbed
+from twin.signals import Array
+
+FEWEST_CYCLES = 3  # over the travel
+MOST_CYCLES = 120  # over the travel, of the first look
+MOST_SAMPLES = 4000  # that the first look takes
+MOST_PEAKS = 6
+MOST_LINES = 3
+EVERY = 1.0  # false-alarm probability up to which a line is tried
+
+
+def spatial_periods(
+    position: Array, force: Array, weight: Array, columns: Array
+) -> tuple[float, ...]:
+    """Periods (m) at which a residual over a weight repeats along the track, likeliest first.
+
+    position (n,) m, force (n,) N: the residual; the repeating part is the weight (n,) times a
+    function of position. columns (n, k): forces that the model's parameters can add.
+    """
+    span = float(np.ptp(position))
+    if span == 0.0 or not force.any():
+        return ()
+    thin = slice(None, None, -(-len(force) // MOST_SAMPLES))
+    peaks = _peaks(position[thin], force[thin], weight[thin], columns[thin], span)
+    highest = 0.25 * len(position) / span
+    found = find_lines(
+        [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
+        most=MOST_LINES, chance=EVERY,
+    )  # fmt: skip
+    lines = (line.period for line in found)
+    apart = [p for p in lines if all(abs(span / p - span / q) > 0.5 for q in peaks)]
+    return (*peaks, *apart)
+
+
+def _peaks(
+    position: Array, force: Array, weight: Array, columns: Array, span: float
+) -> tuple[float, ...]:
+    """Pitches (m) at which a sine gains more than at those beside, the largest gains first."""
+    halves = np.arange(2 * FEWEST_CYCLES, 2 * MOST_CYCLES + 1)
+    turn = np.exp(1j * np.pi / span * position)[:, None]
+    # Each wave is the one before turned on by half a cycle over the travel.
+    waves = np.cumprod(np.hstack([turn ** halves[0], turn.repeat(len(halves) - 1, axis=1)]), axis=1)
+    basis = orthonormal(columns)
+    left = unabsorbed(force, basis)
+    sine, cosine = (unabsorbed(weight[:, None] * wave, basis) for wave in (waves.imag, waves.real))
+    a, b, c = (
+        np.einsum("ij,ij->j", *pair) for pair in ((sine, sine), (cosine, cosine), (sine, cosine))
+    )
+    s, t = sine.T @ left, cosine.T @ left
+    free = a * b - c**2
+    sure = free > 1e-9 * a * b
+    gain = np.where(sure, b * s**2 + a * t**2 - 2.0 * c * s * t, 0.0) / np.where(sure, free, 1.0)
+    beside = np.pad(gain, 1)
+    tops = np.flatnonzero((gain >= beside[:-2]) & (gain >= beside[2:]))
+    best = tops[np.argsort(-gain[tops])][:MOST_PEAKS]
+    return tuple(float(2.0 * span / k) for k in halves[best])
