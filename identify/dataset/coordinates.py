@@ -9,13 +9,13 @@ import numpy as np
 from identify.dataset.dataset import ENOUGH
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, last_direction
+from identify.dataset.readings import FEWEST_CYCLES
 from identify.dataset.spectrum import Record, find_lines, lines_in_time
 from twin.effect import Excitation
 from twin.signals import Array
 
 QUANTITIES = ("position", "velocity", "acceleration")
 OTHER = "other_axis_"
-FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 
 
 def beside(axis: str, quantity: str) -> str:

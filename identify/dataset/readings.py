@@ -27,6 +27,7 @@ from identify.rules import RULE
 from twin.logs import Log
 from twin.signals import Array, between, cubic_through, usual_size, white_noise
 
+FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 ENOUGH = 200_000  # samples, whose noise tells that of all
 GATHERED = 0.5  # mean cosine of differences in turns of a step; 0 where they do not gather
 FEWEST = 0.01  # of the samples, at which a reading must change to tell a step
@@ -141,7 +142,7 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
     finest = min(FINEST_CYCLES / span, 0.5 / step if step else np.inf)
     found: list[float] = []
     for _ in range(MOST_LINES):
-        frequency, share = strongest_line(Record(place, bend), RULE.fewest_cycles / span, finest)
+        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest)
         if share < LEAST:
             break
         bends = np.diff(_waves(readings, 1.0 / frequency), 4, axis=0)
