@@ -24,7 +24,7 @@ from identify.dataset.prepared_log import (
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.walks import averaged_columns, reading_columns
-from twin.effect import RUBBING, Effect, Kind
+from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
@@ -73,11 +73,8 @@ def _is_apart(axis: AxisModel) -> bool:
 
 def _borne(axis: AxisModel) -> list[str]:
     """Names of the effects by which friction depends on the load."""
-    return [f.effect.name for f in axis.effects if _bears(f.effect)]
-
-
-def _bears(effect: Effect) -> bool:
-    return effect.kind in RUBBING and effect.reads("U")
+    effects = (f.effect for f in axis.effects)
+    return [e.name for e in effects if e.kind in RUBBING and e.reads("U")]
 
 
 def _table_between(axis: AxisModel) -> Table:
@@ -209,7 +206,7 @@ def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -
         values = read(axis, where)
         each = zip(where, values, steps, strict=True)
         moved = [write(axis, [c], [value + step]) for c, value, step in each]
-        yield [*range(len(where))], partial(_with_load, moved, axis)
+        yield [*range(len(where))], partial(_one_by_one, moved, axis)
         return
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
@@ -231,12 +228,6 @@ def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -
                 for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
             yield bent, _difference(group, moved, effect)
-
-
-def _with_load(moved: Sequence[AxisModel], unmoved: AxisModel, log: PreparedLog) -> Array:
-    """Change (m, n) N of the residual by walks of their own."""
-    base = residual(unmoved, [log])
-    return np.stack([residual(axis, [log]) - base for axis in moved])
 
 
 def _by_strengths(
@@ -275,9 +266,11 @@ def _difference(group: AxisModel, moved: Sequence[AxisModel], effect: str) -> _A
 
 
 def _one_by_one(moved: Sequence[AxisModel], unmoved: AxisModel | None, log: PreparedLog) -> Array:
-    """The change by walks of their own, from an axis or from no force."""
-    base = 0.0 if unmoved is None else averaged_force(unmoved, [log])
-    return np.stack([averaged_force(axis, [log]) - base for axis in moved])
+    """Change (m, n) N of the residual by walks of their own, from an axis or from no force."""
+    if unmoved is None:
+        return np.stack([averaged_force(axis, [log]) for axis in moved])
+    base = residual(unmoved, [log])
+    return np.stack([residual(axis, [log]) - base for axis in moved])
 
 
 def _together(group: AxisModel, table: Table, sets: Array, absent: bool, log: PreparedLog) -> Array:

@@ -161,7 +161,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         dataset, fit = synchronised(fit, judged.dataset)
         judged = settled(Judged(fit, dataset))
     found = Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
-    return found if first.dataset is judged.dataset else _told_on(judged, found)
+    return found if first.dataset is judged.dataset else _on_final_dataset(judged, found)
 
 
 def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> Judged:
@@ -197,8 +197,8 @@ def _with_free_exponents(
     return judged, out
 
 
-def _told_on(final: Judged, found: Found) -> Found:
-    """What was found, told on the dataset of the final fit, whose channel delay is another.
+def _on_final_dataset(final: Judged, found: Found) -> Found:
+    """What was found, on the dataset of the final fit, whose channel delay is another.
 
     So that the error without anything is one number, beside every candidate and in the answer. What
     was decided, and by which score, stays.
@@ -211,14 +211,14 @@ def _told_on(final: Judged, found: Found) -> Found:
 
     first = there(found.base.fit)
 
-    def told(one: Candidate) -> Candidate:
+    def candidate(one: Candidate) -> Candidate:
         if one.is_noise or one.score is None:
             left, error = np.sqrt(one.gain.left), first.other_error
             return replace(one, gain=replace(one.gain, before=error, after=left * error))
         by = candidate_of(first, there(one.fit), one.effect, ())
         return replace(one, fit=by.fit, evidence=by.evidence, gain=by.gain)
 
-    ranking = {id(one): told(one) for one in found.ranking}
+    ranking = {id(one): candidate(one) for one in found.ranking}
 
     def same(step: Step) -> Step:
         own = step.tried.candidate
