@@ -237,8 +237,9 @@ def _tones(log: PreparedLog, white: float, frequency: Array, gain: Array) -> Arr
     strayed, steps = _uneven(log)
     above = np.zeros(len(steps))
     for k in range(1, HARMONICS + 1):
-        turns = k * steps
+        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * (k * steps > 0.5)  # slower ones are told
+        left = np.flatnonzero(part > RULE.line_chance)  # noise leaves few, and these take the time
+        turns = k * steps[left]
         tone = np.interp(np.abs(turns - np.rint(turns)) / log.motion.sample_period, frequency, gain)
-        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * (turns > 0.5)  # slower ones are told
-        above += part * (log.motion.resolution**2 / 12.0 * tone - white)
+        above[left] += part[left] * (log.motion.resolution**2 / 12.0 * tone - white)
     return above

@@ -32,7 +32,7 @@ WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 BAND = 20  # resolutions whose median tells the level of the spectrum
 LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
 MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
-ROUNDS = 12  # of least squares, after which levels rest
+ROUNDS, RESTING = 12, 1e-4  # of least squares, at most; the relative change of levels that rest
 TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 
 
@@ -89,19 +89,24 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
     for _ in range(ROUNDS):
         above = np.maximum(np.log(power / model), 0.0) / TOLERATED
         weight = 1.0 / (1.0 + above**2)
+        before = levels
         levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
+        if np.allclose(levels, before, rtol=RESTING, atol=0.0):
+            break
         model = np.maximum(shapes @ levels, least[0])
     return levels
 
 
 def _not_negative(columns: Array, wanted: Array) -> Array:
     """Gains (k,) of least squares; a column whose gain would be the most negative is left out."""
-    gains, kept = np.zeros(columns.shape[1]), np.flatnonzero(columns.any(axis=0))
+    square, met = columns.T @ columns, columns.T @ wanted
+    size = np.sqrt(square.diagonal())
+    gains, kept = np.zeros(len(size)), np.flatnonzero(size)
     while len(kept):
-        size = np.linalg.norm(columns[:, kept], axis=0)
-        found = np.linalg.lstsq(columns[:, kept] / size, wanted, rcond=None)[0]
+        unit = square[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
+        found = np.linalg.lstsq(unit, met[kept] / size[kept], rcond=None)[0]
         if found.min() >= 0.0:
-            gains[kept] = found / size
+            gains[kept] = found / size[kept]
             break
         kept = np.delete(kept, np.argmin(found))
     return gains
