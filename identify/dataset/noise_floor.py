@@ -237,7 +237,8 @@ def _tones(log: PreparedLog, white: float, frequency: Array, gain: Array) -> Arr
     strayed, steps = _uneven(log)
     above = np.zeros(len(steps))
     for k in range(1, HARMONICS + 1):
-        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * (k * steps > 0.5)  # slower ones are told
+        fast = k * steps > 0.5  # slower ones are told
+        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * fast
         left = np.flatnonzero(part > RULE.line_chance)  # noise leaves few, and these take the time
         turns = k * steps[left]
         tone = np.interp(np.abs(turns - np.rint(turns)) / log.motion.sample_period, frequency, gain)

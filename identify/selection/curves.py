@@ -57,16 +57,6 @@ class Shape:
         """
         return self.period is None
 
-    @property
-    def turns(self) -> bool:
-        """Whether a part of it turns with the direction of motion."""
-        return self.empty.effect.parts[1].name in self.stiffness
-
-    def alone(self) -> Shape:
-        """The part that turns with the direction, alone."""
-        turned = self.empty.effect.parts[1].name
-        return replace(self, stiffness={turned: self.stiffness[turned]})
-
 
 def shapes_of(fit: Fit, dataset: Dataset, effect: str | None = None) -> list[Shape]:
     """A free curve for each curve that a law of the fit assumes, where the data ask for one.
@@ -144,8 +134,7 @@ def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | No
         curve = replace(curve, by_direction=False)
     forms = (False, True) if curve.by_direction else (False,)
     tried = [_smoothed(fit, dataset, law, curve, lets_go) for lets_go in forms]
-    best, _ = min(tried, key=lambda found: found[1])
-    return best if best and (best.turns or not curve.rubs) else None
+    return min(tried, key=lambda found: found[1])[0]
 
 
 def _both_ways(fit: Fit, dataset: Dataset) -> bool:
@@ -190,7 +179,9 @@ def _laid(
         return None
     period = None if curve.period is None else law.values[curve.period]
     values = free.free_shape.laid(curve, period, dataset.excitation, lets_go)
-    empty = Fitted.at_start(free, values)
+    empty, (even, odd) = Fitted.at_start(free, values), free.parts
     if not curve.by_direction:
-        empty = replace(empty, fixed=empty.fixed | set(free.parts[1].strengths))
+        empty = replace(empty, fixed=empty.fixed | set(odd.strengths))
+    if curve.rubs:  # a force that does not turn with the direction is no friction
+        empty = replace(empty, fixed=empty.fixed | set(even.strengths))
     return Shape(law.effect.name, law.effect.kind, curve, period, empty, lets_go, {})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -71,6 +71,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     linear = Linearised.about(fit, dataset, shape.empty, mask).less(shape.effect)
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
+    names = [c.parameter.name for c, is_own in zip(linear.where, own, strict=True) if is_own]
     hats = linear.columns[:, own]
     gram, met = hats.T @ hats, hats.T @ law[fit.kept][mask]
     del hats  # columns of all logs are large
@@ -78,7 +79,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     correction, spread = _corrected(linear, shape.stiffness)
     coordinate, index = _knots(shape)
     curves = {}
-    for name, weights in _directions(shape, index, len(assumed)).items():
+    for name, weights in _directions(shape, index, names).items():
         full = np.zeros((len(weights), len(own)))
         full[:, own] = weights
         visits = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", weights, gram, weights), 0.0))
@@ -102,12 +103,14 @@ def _knots(shape: Shape) -> tuple[Array, list[int]]:
     return np.array(coordinate), index
 
 
-def _directions(shape: Shape, index: list[int], strengths: int) -> dict[str, Array]:
-    """By direction, weights (k, strengths) of the strengths in the curve's value at each knot."""
-    even = np.eye(strengths)[index]
+def _directions(shape: Shape, index: list[int], names: Sequence[str]) -> dict[str, Array]:
+    """By direction, weights (k, n) of the strengths with these names in the curve at each knot."""
+    even, odd = (
+        np.array([[float(name == part.strengths[i]) for name in names] for i in index])
+        for part in shape.empty.effect.parts
+    )
     if not shape.curve.by_direction:
         return {BOTH: even}
-    odd = np.eye(strengths)[[i + strengths // 2 for i in index]]
     return {AHEAD: even + odd, BEHIND: even - odd}
 
 
