@@ -21,7 +21,7 @@ from twin.errors import InputError
 MEASURED = (
     "simulation", "starts", "peer_fits", "diagnosis", "passes", "kinds", "stages",
     "mcap_logs", "effect_cost", "emps", "withheld", "foreign", "drives", "thesis", "selftest",
-    "export", "rule", "fuzz", "mutation", "size",
+    "export", "frf", "rule", "fuzz", "mutation", "size",
 )  # fmt: skip
 # What takes options, or half an hour, by its name alone, and the module.
 RUNS = {

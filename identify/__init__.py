@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Addition", "Agreement", "Comparison", "Diagnosis", "Feedforward", "FitResult",
-    "SimulationFit", "add", "add_shape", "agree", "along_track", "cable_force", "compare",
+    "FrequencyResponse", "SimulationFit", "add", "add_shape", "agree", "along_track",
+    "cable_force", "compare",
     "diagnose", "dynamic_friction", "feedforward", "first_model", "fit", "fit_simulation",
-    "friction_map", "plan", "velocity_map",
+    "frequency_response", "friction_map", "plan", "velocity_map",
 ]  # fmt: skip
 
 

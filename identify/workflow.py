@@ -27,9 +27,12 @@ from identify.estimation.simulated_motion import fit_simulated_motion
 from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
-from identify.output.text import diagnose_text as diagnose_text  # with it results print themselves
+from identify.frequency.of_logs import responses_of
+from identify.output.frequency import frequency_text as frequency_text  # results print themselves
+from identify.output.text import diagnose_text as diagnose_text
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.results.addition import Addition, addition
+from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     AxisSummary,
     Comparison,
@@ -351,6 +354,26 @@ def feedforward(
     simulated = model if machine is None else as_model(machine, catalogue)
     found = tracking(simulated, model, before, given, progress)
     return Feedforward(model, before, tuple(given), found)
+
+
+def frequency_response(
+    logs: GivenLogs,
+    model: Model | None = None,
+    *,
+    catalogue: Catalogue | None = None,
+    progress: Progress = silent,
+) -> FrequencyResponse:
+    """The response of position to force that logs show, with mass, resonances, delay and margins.
+
+    The best linear approximation, with the setpoint as instrument; see identify.frequency. model:
+    is simulated on the setpoints of the logs, and its response estimated in the same way. Raises
+    InputError where no axis moves in all of the logs, or their sample rates differ.
+    """
+    given = logs_by_name(logs)
+    machine = None if model is None else as_model(model, catalogue)
+    found = responses_of(given, machine, progress)
+    title = "the machine" if machine is None else machine.name
+    return FrequencyResponse(title, tuple(given), found)
 
 
 def add_named(found: Diagnosis) -> Addition | None:

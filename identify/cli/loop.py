@@ -1,4 +1,4 @@
-"""Commands of the loop: fit, compare, diagnose, add, agree, feedforward, plan, demo."""
+"""Commands of the loop: fit, compare, diagnose, add, agree, feedforward, frf, plan, demo."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from identify.cli.command import Said, require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     MEANINGLESS,
+    CheckedRecordings,
     Effects,
     FitLogs,
     Holdout,
@@ -249,6 +250,44 @@ def feedforward(
         partial(workflow.feedforward, before=earlier), machine, logs
     )
     return said_of(result, [*findings, *silent])
+
+
+@app.command()
+def frf(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Table of the responses to write (.csv).")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Bode diagram to write (.png, .svg, .pdf).")
+    ] = None,
+    effects: Effects = None,
+) -> Said:
+    """Tell the frequency response of force to position: mass, resonances, delay, margins.
+
+    Example: twin frf multisine.mcap fitted.toml --plot bode.png
+    """
+    from identify import workflow
+    from identify.output.frequency import write_bode
+
+    paths = [Path(name) for name in logs if not name.endswith(".toml")]
+    models = [name for name in logs if name.endswith(".toml")]
+    if len(models) > 1 or not paths:
+        raise InputError(f"{' '.join(logs)}: give logs (.mcap) and one model (.toml) at most")
+    machine = loaded(models[0], effects)[0] if models else None
+    with progress_on_stderr() as progress:
+        recorded = CheckedRecordings(paths)
+        result = workflow.frequency_response(recorded, machine, progress=progress)
+    if out:
+        result.write_csv(out)
+    if plot:
+        write_bode(result, plot)
+    return said_of(result, recorded.findings)
 
 
 @app.command()

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
-from identify.output.answers import diagnoses, fits, machine
+from identify.output.answers import diagnoses, fits, frequency, machine
 from identify.output.answers.answer import SCHEMA, Answer, answer_of
 from twin.files import write_atomically
 from twin.schemas import FOLDER
@@ -25,7 +25,9 @@ def json_of(result: Any, **more: Any) -> dict[str, Any]:
 
 def answers() -> list[type[Answer]]:
     """The class of every object that a command prints."""
-    known = {k: v for module in (machine, fits, diagnoses) for k, v in vars(module).items()}
+    known = {
+        k: v for module in (machine, fits, diagnoses, frequency) for k, v in vars(module).items()
+    }
     return [v for k, v in known.items() if k.endswith("Answer") and v is not Answer]
 
 

@@ -49,6 +49,14 @@ class Controller:
             mass=mass,
         )
 
+    def response(self, frequency: NDArray[np.float64], period: float) -> NDArray[np.complex128]:
+        """Force over reading, less its sign, (k,) N/m at frequencies (k,) Hz; see ``command``."""
+        late = np.exp(-2j * np.pi * frequency * period)
+        kept = math.exp(-2.0 * math.pi * self.filter_bandwidth * period)
+        speed = (1.0 - kept) / (1.0 - kept * late) * (1.0 - late) / period
+        summed = period * late / (1.0 - late)
+        return np.asarray(self.proportional + self.derivative * speed + self.integral * summed)
+
 
 def gain_table(
     controllers: Mapping[str, Controller], axes: Mapping[str, AxisModel], period: float

@@ -342,6 +342,91 @@ class Sweep(OneAxis):
         return 2.0 * np.pi * cycles
 
 
+@dataclass(frozen=True)
+class Multisine(OneAxis):
+    """Many sines at once on a slow motion of one axis back and forth, again and again.
+
+    The slow motion keeps friction from sticking but at its two reversals a period. The sines are
+    all multiples of the period's frequency between two bounds, with random phases and equal
+    accelerations, so that their amplitude falls with the square of the frequency; together they use
+    what the slow motion leaves of the limits. They begin within a period before and end within one
+    after.
+    """
+
+    summary = "many sines at once on a slow motion of one axis, for its frequency response"
+
+    period: float = given("s", "of the motion; its inverse is the distance of the frequencies")
+    repeats: int = counted("periods, between one in which it begins and one in which it ends")
+    span: float = given("m", "of the slow motion, centred on the place")
+    lowest: float = given("Hz", "frequency of the slowest sine")
+    highest: float = given("Hz", "frequency of the fastest sine")
+    phases: int = counted("which random phases; others are another realisation")
+
+    def on(
+        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
+    ) -> AnySetpoint:
+        """See OneAxis."""
+        rate, limit = model.sample_rate, limits[axis]
+        require_length((self.repeats + 2) * self.period, rate)
+        samples = round(self.period * rate)
+        first, last = (f * samples / rate for f in (self.lowest, self.highest))
+        lines = np.arange(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
+        if not (len(lines) and lines[0] >= 1 and 2 * lines[-1] < samples):
+            raise InputError(
+                f"lowest = {self.lowest:g} Hz, highest = {self.highest:g} Hz: give them in rising "
+                f"order, at least {rate / samples:.3g} Hz, below half the sample rate of {rate:g} "
+                "Hz"
+            )
+        slow, sines = np.zeros((2, samples // 2 + 1), dtype=complex)
+        slow[1] = 0.25 * self.span * samples
+        turns = np.random.default_rng(self.phases).uniform(0.0, 2.0 * np.pi, len(lines))
+        sines[lines] = np.exp(1j * turns) / lines**2
+        both = [_begun_and_ended(s, samples, rate, self.repeats) for s in (slow, sines)]
+        motion = both[0] + _most(limit, *both) * both[1]
+        columns = np.zeros((3, motion.shape[1], len(limits)))
+        columns[0] = place
+        columns[:, :, axis] += motion[:3]
+        position = inside_travel(limits, columns[0])
+        return Setpoint(position, columns[1], columns[2], np.zeros_like(position), rate)
+
+
+def _begun_and_ended(spectrum: np.ndarray, samples: int, rate: float, repeats: int) -> FloatArray:
+    """A periodic motion that rises from rest within a period and ends within one, (4, n).
+
+    Position and its three rates; spectrum: of one period of so many samples.
+    """
+    turn = 2j * np.pi * np.fft.rfftfreq(samples, 1.0 / rate)
+    periodic = np.fft.irfft(spectrum * turn ** np.arange(4)[:, None], samples)
+    periodic = np.tile(periodic, repeats + 2)
+    rises = np.polynomial.Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
+    along = np.arange(samples) / samples
+    weights = np.zeros((4, periodic.shape[1]))
+    weights[0] = 1.0
+    for k in range(4):
+        own = rises.deriv(k)(along) * (rate / samples) ** k
+        weights[k, :samples] = own
+        weights[k, -samples:] = (-1) ** k * own[::-1]
+    return np.array(
+        [
+            sum(math.comb(k, j) * weights[j] * periodic[k - j] for j in range(k + 1))
+            for k in range(4)
+        ]
+    )
+
+
+def _most(limit: Limits, slow: FloatArray, sines: FloatArray) -> float:
+    """Times which sines (4, n) may be added to a slow motion within the limits of an axis."""
+    allowed = np.array([limit.velocity, limit.acceleration, limit.jerk])[:, None]
+    left = allowed - np.abs(slow[1:])
+    if left.min() <= 0.0:
+        raise CannotRun(
+            f"the slow motion alone goes beyond the limits of axis {limit.name}; give a longer "
+            "period, a shorter span or more effort"
+        )
+    moved = np.abs(sines[1:]) > 0.0
+    return float(np.min(left[moved] / np.abs(sines[1:][moved])))
+
+
 def _there_and_back(
     limits: Sequence[Limits], axis: int, place: FloatArray, half: float, speed: float, dwell: float
 ) -> list[Phases]:
@@ -387,6 +472,7 @@ KINDS: Mapping[str, type[Experiment]] = {
     "steps": Steps,
     "rests": Rests,
     "sweep": Sweep,
+    "multisine": Multisine,
 }
 
 

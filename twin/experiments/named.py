@@ -19,6 +19,7 @@ from twin.experiments.file import format_experiment, setpoint_of
 from twin.experiments.follow import follow_parts
 from twin.experiments.kinds import (
     Moves,
+    Multisine,
     OpenLoopSine,
     Passes,
     Reversals,
@@ -78,6 +79,18 @@ def _reversals(model: MachineModel, axis: str, duration: float) -> Experiment:
     return lasting(Reversals(axis, repeats=1), model, duration)
 
 
+def _multisine(model: MachineModel, axis: str, duration: float) -> Experiment:
+    """Four periods, between one in which it begins and one in which it ends."""
+    limit, period = _limit(model, axis), duration / 6.0
+    low, high = limit.travel
+    # The slow motion takes a quarter of each limit at most.
+    turn = 2.0 * np.pi / period
+    most = min(limit.velocity / turn, limit.acceleration / turn**2, limit.jerk / turn**3)
+    span = min(0.2 * (high - low), 0.1 * most)
+    highest = min(0.4 * model.sample_rate, 10.0 * model.axes[axis].hardware.bandwidth)
+    return Multisine(axis, period, 4, span, min(4.0 / period, 0.5 * highest), highest, 1)
+
+
 EXPERIMENTS: Mapping[str, Named] = {
     "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration)),
     "moves": Named(Moves.summary, _moves),
@@ -88,6 +101,7 @@ EXPERIMENTS: Mapping[str, Named] = {
         "sinusoidal force of 0.21 N and 3 s on one axis, no feedback",
         lambda model, axis, duration: OpenLoopSine(axis, duration),
     ),
+    "multisine": Named(Multisine.summary, _multisine),
 }
 
 

@@ -1,0 +1,220 @@
+"""Mass, damping, resonances and delay that a frequency response shows.
+
+The plant is a mass with viscous damping and stiffness, and modes beside it:
+
+    P(s) = exp(-s tau) (1/(m s^2 + d s + k) + sum c_i/(s^2 + 2 z_i w_i s + w_i^2)).
+
+The command is held over a sample and may act a part of one late, so that what is compared is the
+exact response of its samples: each pole p is a state x' = p x + r u(t - tau), solved over a sample
+(K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, chapter 2). Modes are
+added while Schwarz's criterion asks for them. Bands are of linear error propagation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+
+from identify.frequency.response import Complex, Response
+from identify.rules import RULE
+from twin.errors import InputError
+from twin.signals import Array
+
+SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
+DAMPING = (1e-4, 0.005, 0.05, 0.5)  # of a mode: least, two at which it is sought, and most
+NEAREST = 0.01  # of a response: the error that a polynomial over a resonance may have of its own
+
+
+@dataclass(frozen=True)
+class Told:
+    """A value and half its 90 % band, both in its unit."""
+
+    value: float
+    band: float
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A resonance: its frequency Hz, damping ratio, and part of the response beside the mass's."""
+
+    frequency: Told
+    damping: Told
+    gain: Told
+    """c m (1): where positive, encoder and motor are on one side of the spring."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """What a response shows; on a rotary axis inertia (kg m^2) and so on."""
+
+    mass: Told
+    """kg"""
+    damping: Told
+    """N s/m"""
+    stiffness: Told
+    """N/m: of a presliding friction, where the motion does not break away."""
+    delay: Told
+    """s, from the beginning of the sample whose command acts."""
+    modes: tuple[Mode, ...]
+    fitted: Complex
+    """The response (k,) m/N of these values at the frequencies of the estimate."""
+    misfit: float
+    """RMS of what it leaves, in standard deviations of the estimate; 1 where all of it is told."""
+
+
+def plant_of(found: Response, most: int = 4) -> Plant:
+    """Read the plant off a response, with ``most`` modes at most.
+
+    Raises InputError where too few frequencies tell anything.
+    """
+    told = found.at(found.tells)
+    if len(told.frequency) < 12:
+        raise InputError(
+            f"the response is told at {len(told.frequency)} of {len(found.frequency)} frequencies, "
+            "too few for a mass; excite the axis more: `twin simulate multisine`"
+        )
+    told = replace(told, spread=np.hypot(told.spread, NEAREST * np.abs(told.plant)))
+    best = _solved(told, _rigid(told))
+    for _ in range(most):
+        better = min(
+            (_solved(told, start) for start in _with_mode(told, best)), key=lambda s: s.cost
+        )
+        # Twice the fall of the cost is that of a log likelihood; three values more.
+        if best.cost - better.cost < 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic:
+            break
+        if any(abs(m.gain.value) < m.gain.band for m in _read(found, told, better).modes):
+            break  # one may be none
+        best = better
+    return _read(found, told, best)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Values (n,) at the least cost, with their covariance (n, n)."""
+
+    values: Array
+    cost: float
+    covariance: Array
+
+
+def _solved(told: Response, start: Array) -> _Solved:
+    from scipy.optimize import least_squares  # takes a while to load
+
+    modes = (len(start) - 4) // 3
+
+    def left(values: Array) -> Array:
+        error = (_sampled(values, told) - told.plant) / told.spread
+        return np.concatenate([error.real, error.imag]) * np.sqrt(2.0)
+
+    omega = np.log(2.0 * np.pi * told.frequency[[0, -1]])
+    low = [start[0] - 7.0, -20.0, -20.0, -100.0] + [omega[0], np.log(DAMPING[0]), -np.inf] * modes
+    high = [start[0] + 7.0, 20.0, 40.0, 100.0] + [omega[1], np.log(DAMPING[-1]), np.inf] * modes
+    # A robust loss: what is not linear has peaks of its own.
+    done = least_squares(
+        left, np.clip(start, low, high), bounds=(low, high), x_scale="jac", loss="soft_l1",
+        f_scale=3.0, max_nfev=200,
+    )  # fmt: skip
+    square = done.jac.T @ done.jac
+    spread = max(2.0 * done.cost / max(len(done.fun) - len(start), 1), 1.0)
+    return _Solved(done.x, 2.0 * done.cost, spread * np.linalg.pinv(square))
+
+
+def _rigid(told: Response) -> Array:
+    """Logarithms of mass, damping, stiffness over mass, and the delay in samples, to begin with."""
+    omega = 2.0 * np.pi * told.frequency
+    mass = float(np.median(1.0 / (omega**2 * np.abs(told.plant))))
+    return np.array([np.log(mass), np.log(0.1 * omega[0]), np.log(0.1 * omega[0] ** 2), 0.1])
+
+
+def _with_mode(told: Response, best: _Solved) -> list[Array]:
+    """Values with one mode more, where a linear step finds that one takes most."""
+    left = (told.plant - _sampled(best.values, told)) / told.spread
+    tried = []
+    for omega in 2.0 * np.pi * told.frequency[2:-2]:
+        for damping in DAMPING[1:-1]:
+            alone = _sampled(
+                np.array([*best.values[:4], np.log(omega), np.log(damping), 1.0]), told
+            )
+            shape = (alone - _sampled(best.values[:4], told)) / told.spread
+            gain = float(np.real(np.vdot(shape, left)) / np.real(np.vdot(shape, shape)))
+            fall = gain * float(np.real(np.vdot(shape, left)))
+            tried.append((fall, omega, damping, gain))
+    tried.sort(reverse=True)
+    apart: list[tuple[float, float, float, float]] = []
+    for one in tried:
+        if all(abs(np.log(one[1] / other[1])) > 0.1 for other in apart):
+            apart.append(one)
+        if len(apart) == 2:
+            break
+    return [np.array([*best.values, np.log(w), np.log(z), c]) for _, w, z, c in apart]
+
+
+def _sampled(values: Array, told: Response) -> Complex:
+    """Response (k,) of the samples of a plant with these values."""
+    mass, damping, stiffness = np.exp(values[[0, 1, 2]])
+    terms = [(_roots(damping, stiffness), 1.0 / mass)]
+    for log_omega, log_ratio, gain in values[4:].reshape(-1, 3):
+        omega, ratio = np.exp(log_omega), np.exp(log_ratio)
+        terms.append((_roots(2.0 * ratio * omega, omega**2), gain / mass))
+    late = values[3] * told.period
+    return np.asarray(sum(_held(roots, gain, late, told) for roots, gain in terms))
+
+
+def _roots(linear: float, constant: float) -> tuple[complex, complex]:
+    """The roots of s^2 + linear s + constant, never the same, as each has a state of its own."""
+    half = 0.5 * linear
+    apart = np.sqrt(complex(half**2 - constant))
+    apart = apart if abs(apart) > 1e-6 * (half + 1e-9) else complex(1e-6 * (half + 1e-9))
+    far = -half - apart
+    return far, (constant / far if abs(apart.imag) == 0.0 else -half + apart)
+
+
+def _held(roots: Sequence[complex], gain: float, late: float, told: Response) -> Complex:
+    """Response (k,) of gain/((s - p) (s - q)) to a command held over samples and late by s."""
+    period, turn = told.period, 2j * np.pi * told.frequency * told.period
+    whole = np.floor(late / period)
+    part = late - whole * period
+    out = np.zeros(len(told.frequency), dtype=complex)
+    for own, other in (roots, roots[::-1]):
+        before = np.exp(own * (period - part)) * _grown(own, part)  # by the command before
+        now = _grown(own, period - part)
+        drive = before * np.exp(-turn) + now
+        out += gain / (own - other) * drive / (np.exp(turn) - np.exp(own * period))
+    return out * np.exp(-whole * turn)
+
+
+def _grown(pole: complex, time: float) -> complex:
+    """(exp(p t) - 1)/p, s."""
+    x = pole * time
+    return time * (1.0 + 0.5 * x + x * x / 6.0) if abs(x) < 1e-5 else np.expm1(x) / pole
+
+
+def _read(found: Response, told: Response, best: _Solved) -> Plant:
+    values, bands = best.values, SURE * np.sqrt(np.maximum(np.diag(best.covariance), 0.0))
+    mass = float(np.exp(values[0]))
+
+    def logarithm(i: int, times: float = 1.0) -> Told:
+        value = times * float(np.exp(values[i]))
+        return Told(value, value * float(np.expm1(min(bands[i], 50.0))))
+
+    modes = tuple(
+        Mode(
+            logarithm(i, 0.5 / np.pi),
+            logarithm(i + 1),
+            Told(float(values[i + 2]), float(bands[i + 2])),
+        )
+        for i in range(4, len(values), 3)
+    )
+    left = np.abs(_sampled(values, told) - told.plant) / told.spread
+    return Plant(
+        mass=logarithm(0),
+        damping=logarithm(1, mass),
+        stiffness=logarithm(2, mass),
+        delay=Told(float(values[3]) * told.period, float(bands[3]) * told.period),
+        modes=tuple(sorted(modes, key=lambda m: m.frequency.value)),
+        fitted=_sampled(values, found),
+        misfit=float(np.sqrt(np.mean(left**2))),
+    )

@@ -1,0 +1,227 @@
+"""The best linear approximation of force to position, from logs under feedback.
+
+A machine with friction has no transfer function, but at a given excitation a best linear
+approximation (R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
+ed., 2012, chapters 3, 4 and 7). Under feedback the command holds the noise of the readings, so that
+the ratio of their spectra is biased; the setpoint is the instrument: the responses of command and
+of reading to it are estimated together, and divided.
+
+Each is estimated by the local polynomial method: about each frequency the response and the
+transient of the record are polynomials of the frequency, and what these leave is the variance of
+noise and of what is not linear. Where the setpoint repeats, the scatter from period to period tells
+noise alone, and the rest of the variance is what is not linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.signals import Array
+
+Complex = NDArray[np.complex128]
+
+POWERS = np.arange(3)  # of the polynomials, for the response and for the transient
+UNKNOWNS = 2 * len(POWERS)
+LOUDEST = 10.0  # times its surroundings, above which a line, of a slow motion, is left out: what
+# friction makes of it would decide there
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Signals of one log, (n,) each: setpoint, None where there is none, force, and position."""
+
+    setpoint: Array | None
+    force: Array
+    position: Array
+    period: float
+    """s, between samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Responses at frequencies (k,) Hz, rising.
+
+    Forces are held over a sample, and readings are of its beginning: a plant P(s) has here the
+    response of its samples, not P(2 pi i f).
+    """
+
+    frequency: Array
+    plant: Complex
+    """Position over force, m/N."""
+    spread: Array
+    """Standard deviation of it, m/N: the root of the mean square of its error."""
+    noise: Array
+    """Part of that which is noise, m/N; no number where no setpoint repeats."""
+    closed: Complex
+    """Position over setpoint; no number where a log has none."""
+    coherence: Array
+    """Part of the power of force and of position, the smaller, that the instrument makes, 0..1."""
+    band: Array
+    """Radius, m/N, of the circle about the plant that holds the true one 9 times in 10."""
+    period: float
+    """s, between samples."""
+
+    @property
+    def distortion(self) -> Array:
+        """Part of the spread that is not noise: what is not linear, m/N."""
+        return np.sqrt(np.maximum(self.spread**2 - self.noise**2, 0.0))
+
+    @property
+    def tells(self) -> NDArray[np.bool_]:
+        """Where a band twice as wide would not reach zero: of noise alone hardly any would."""
+        return np.asarray(2.0 * self.band < np.abs(self.plant))
+
+    def at(self, kept: NDArray[np.bool_]) -> Response:
+        """The same at some of the frequencies."""
+        names = ("frequency", "plant", "spread", "noise", "closed", "coherence", "band")
+        return Response(**{n: getattr(self, n)[kept] for n in names}, period=self.period)
+
+
+def response(records: Sequence[Record], count: int = 200, width: float = 0.03) -> Response:
+    """The response that records show together, at ``count`` frequencies or fewer.
+
+    width: half of that over which it is taken as a polynomial, of the frequency: a resonance of
+    damping z is told where its own half width z is larger. Records are weighed by their variances.
+    Raises InputError where the sample periods differ, and where a record is too short.
+    """
+    periods = {record.period for record in records}
+    if len(periods) != 1:
+        rates = ", ".join(f"{1.0 / p:g} Hz" for p in sorted(periods))
+        raise InputError(f"the logs are sampled at {rates}; give logs of one rate")
+    period = periods.pop()
+    spectra = [_Spectra.of(record) for record in records]
+    longest = max(s.cells for s in spectra) * period
+    lowest = (UNKNOWNS + 2) / min(s.cells * period for s in spectra)
+    if not lowest < 0.45 / period:
+        raise InputError(
+            f"the shortest log holds {min(s.cells for s in spectra)} samples of one period of its "
+            "setpoint; give longer ones"
+        )
+    grid = np.geomspace(lowest, 0.45 / period, count)
+    grid = np.unique(np.rint(grid * longest)) / longest
+    found = [[s.about(f, width) for f in grid] for s in spectra]
+    return _together(grid, found, period)
+
+
+@dataclass(frozen=True)
+class _Local:
+    """Responses of force and position to the instrument at one frequency: mean, covariance, ..."""
+
+    mean: Complex  # (2,): of force, of position
+    covariance: Complex  # (2, 2) of their errors
+    noise: Complex  # (2, 2), the part of noise; no number where nothing repeats
+    explained: Array  # (2,) part of the power
+    freedom: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectra:
+    """Spectra of instrument (m,) and signals (m, 2), differenced twice; scatter of periods."""
+
+    instrument: Complex
+    signals: Complex
+    noise: Complex | None  # (m, 2, 2), covariance of the mean over periods
+    cells: int  # samples of one transform
+    period: float
+
+    @classmethod
+    def of(cls, record: Record) -> _Spectra:
+        drive = record.force if record.setpoint is None else record.setpoint
+        signals = np.stack([drive, record.force, record.position])
+        bent = np.diff(signals, 2)  # which has no trend: what drifts would leak everywhere
+        n = bent.shape[1]
+        cells = n if record.setpoint is None else _repeats_after(bent[0])
+        periods = n // cells - 2  # the first holds a transient, the last may end
+        if periods < 2:
+            turned = np.fft.rfft(bent) / np.sqrt(n)
+            return cls(turned[0], turned[1:].T, None, n, record.period)
+        # What repeats has no ends, and is differenced by its spectrum.
+        inner = signals[:, cells : (periods + 1) * cells].reshape(3, periods, cells)
+        bend = (1.0 - np.exp(-2j * np.pi * np.arange(cells // 2 + 1) / cells)) ** 2
+        each = np.fft.rfft(inner) * bend / np.sqrt(cells)
+        mean, own = each.mean(axis=1), each[1:] - each[1:].mean(axis=1, keepdims=True)
+        noise = np.einsum("ipm,jpm->mij", own, own.conj()) / ((periods - 1) * periods)
+        return cls(mean[0], mean[1:].T, noise, cells, record.period)
+
+    def about(self, frequency: float, width: float) -> _Local:
+        """The responses about a frequency, by least squares over what is as near as ``width``."""
+        centre = frequency * self.cells * self.period
+        half = max(round(width * centre), UNKNOWNS)
+        first = max(min(round(centre) - half, len(self.instrument) - 1 - 2 * half), 1)
+        at = np.arange(first, min(first + 2 * half + 1, len(self.instrument)))
+        size = np.abs(self.instrument[at])
+        at = at[size <= LOUDEST * np.median(size)]
+        powers = (((at - centre) / half)[:, None] ** POWERS).astype(complex)
+        columns = np.hstack([self.instrument[at, None] * powers, powers])
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0.0] = 1.0
+        inverse = np.linalg.pinv(columns / size, rcond=1e-12) / size[:, None]
+        rows = self.signals[at]
+        found = inverse @ rows
+        left = rows - columns @ found
+        freedom = max(len(at) - UNKNOWNS, 1)
+        weights = inverse[0]
+        covariance = left.T @ left.conj() / freedom * np.sum(np.abs(weights) ** 2)
+        noise = np.full((2, 2), np.nan, dtype=complex)
+        if self.noise is not None:
+            noise = np.einsum("m,mij->ij", np.abs(weights) ** 2, self.noise[at])
+        moved = rows - columns[:, len(POWERS) :] @ found[len(POWERS) :]
+        whole = np.maximum(np.sum(np.abs(moved) ** 2, axis=0), np.finfo(float).tiny)
+        explained = 1.0 - np.sum(np.abs(left) ** 2, axis=0) / whole
+        return _Local(found[0], covariance, noise, np.clip(explained, 0.0, 1.0), freedom)
+
+
+def _repeats_after(signal: Array) -> int:
+    """Samples after which a signal (n,) without noise repeats; n where it does not.
+
+    In its first and its last period it may begin and end.
+    """
+    n = len(signal)
+    alike = np.fft.irfft(np.abs(np.fft.rfft(signal, 2 * n)) ** 2)[: n // 3]
+    inner = alike[1:-1]
+    tops = np.flatnonzero((inner >= alike[:-2]) & (inner >= alike[2:]) & (inner > 0.3 * alike[0]))
+    for cells in tops + 1:
+        middle = signal[cells:-cells]
+        if np.abs(middle[cells:] - middle[:-cells]).max() < 1e-3 * np.ptp(middle):
+            return int(cells)
+    return n
+
+
+def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> Response:
+    """Responses of several logs as one, each weighed by its variance."""
+    from scipy.stats import f as fisher  # takes a while to load
+
+    plant, closed = np.zeros((2, len(grid)), dtype=complex)
+    spread, noise, coherence, band = np.zeros((4, len(grid)))
+    for k, at in enumerate(zip(*found, strict=True)):
+        quotients = [_ratio(one) for one in at]
+        weight = np.array([1.0 / max(v, np.finfo(float).tiny) for _, v, _ in quotients])
+        weight /= weight.sum()
+        plant[k] = sum(w * q[0] for w, q in zip(weight, quotients, strict=True))
+        spread[k], noise[k] = (
+            np.sqrt(sum(w**2 * q[i] for w, q in zip(weight, quotients, strict=True)))
+            for i in (1, 2)
+        )
+        closed[k] = sum(w * one.mean[1] for w, one in zip(weight, at, strict=True))
+        coherence[k] = sum(w * one.explained.min() for w, one in zip(weight, at, strict=True))
+        freedom = sum(one.freedom for one in at)
+        band[k] = spread[k] * np.sqrt(fisher.ppf(0.9, 2, 2 * freedom))
+    return Response(grid, plant, spread, noise, closed, coherence, band, period)
+
+
+def _ratio(one: _Local) -> tuple[complex, float, float]:
+    """Position over force, its variance, and that of noise (Pintelon, Schoukens, eq. 2-50)."""
+    force, position = one.mean
+    plant = position / force if force else complex(np.nan)
+
+    def variance(c: Complex) -> float:
+        # Of the quotient, to first order: position less plant times force, over the force.
+        left = c[1, 1] - 2.0 * np.real(np.conj(plant) * c[1, 0]) + abs(plant) ** 2 * c[0, 0]
+        return max(float(np.real(left)), 0.0) / abs(force) ** 2 if np.isfinite(left) else np.nan
+
+    return plant, variance(one.covariance), variance(one.noise)

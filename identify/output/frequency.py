@@ -1,0 +1,150 @@
+"""A frequency response as text and as a Bode diagram."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identify.frequency.of_logs import AxisFrequency, Shown
+from identify.frequency.plant import Plant, Told
+from identify.output.numbers import Scale, listed, number, percent, pretty
+from identify.results import figure_of, text_of
+from identify.results.frequency import FrequencyResponse
+from twin.files import atomic_writer
+from twin.model.units import AxisUnits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INKS = ("#2f6db3", "#b4530f")  # measured and model, as on a page
+
+
+@text_of.register
+def frequency_text(result: FrequencyResponse) -> str:
+    """By axis what the logs show, and the model in their place."""
+    lines = [f"force to position, from {listed(result.logs)}"]
+    for name, axis in result.axes.items():
+        lines.append(f"axis {name}")
+        lines += _shown("measured", axis.measured, axis.units)
+        if axis.modelled:
+            lines += _shown("model, in simulation on the same setpoint", axis.modelled, axis.units)
+    return "\n".join(lines)
+
+
+def _shown(title: str, shown: Shown, units: AxisUnits) -> list[str]:
+    found, kept = shown.response, shown.response.tells
+    lines = [f"  {title}"]
+    if not kept.any():
+        return [*lines, "    nothing: the band of the response reaches zero at each frequency"]
+    told = found.frequency[kept]
+    part = f"{np.count_nonzero(kept)} of {len(kept)} frequencies"
+    lines.append(f"    told at {part}, {number(told[0])} to {number(told[-1])} Hz")
+    if np.isfinite(found.noise).any():
+        share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))
+        lines.append(f"    {percent(share)} of its variance is not noise but not linear (median)")
+    if shown.plant is None:
+        lines.append("    too few to read a mass off; `twin simulate multisine` excites more")
+    else:
+        lines += [f"    {line}" for line in _plant(shown.plant, found.period, units)]
+    return [*lines, *(f"    {line}" for line in _loop(shown))]
+
+
+def _plant(plant: Plant, period: float, units: AxisUnits) -> list[str]:
+    lines = [f"{units.mass_name}: {_told(plant.mass, units.mass)}"]
+    if plant.damping.band < plant.damping.value:
+        lines.append(f"viscous damping: {_told(plant.damping, units('N s/m'))}")
+    if plant.stiffness.band < plant.stiffness.value:
+        lines.append(f"stiffness: {_told(plant.stiffness, units('N/m'))}")
+    samples = f"{plant.delay.value / period:.2f} samples"
+    lines.append(f"delay: {_told(plant.delay, 's')}, {samples}")
+    for mode in plant.modes:
+        side = "motor and encoder on one side" if mode.gain.value > 0.0 else "beyond the spring"
+        lines.append(
+            f"resonance: {_told(mode.frequency, 'Hz')}, damping ratio {_told(mode.damping, '1')}, "
+            f"{side}"
+        )
+    return lines or ["no mass"]
+
+
+def _loop(shown: Shown) -> list[str]:
+    loop = shown.loop
+    if loop is None:
+        return ["loop: not told, as the setpoint is fed forward, or there is none"]
+    by = "of the model's controller" if loop.by_controller else "by the setpoint, if nothing is fed"
+    by = by if loop.by_controller else f"{by} forward"
+    crossing = "no crossover in the band"
+    if math.isfinite(loop.crossover):
+        crossing = (
+            f"crossover {number(loop.crossover)} Hz, phase margin "
+            f"{math.degrees(loop.phase_margin):.0f} degrees"
+        )
+    gain = f", gain margin {number(loop.gain_margin)}" if math.isfinite(loop.gain_margin) else ""
+    peak = f"largest sensitivity {number(loop.peak)}"
+    return [f"loop {by}: {crossing}{gain}, {peak}"]
+
+
+def _told(told: Told, unit: str) -> str:
+    """A value with its 90 % band, e.g. "15.00 ± 0.02 kg"."""
+    scale = Scale.of(unit, [told.value, told.band])
+    low, high = told.value - told.band, told.value + told.band
+    value, band = scale.within(low, high, told.value, told.band)
+    return f"{value} ± {band} {scale.unit}".rstrip()
+
+
+def write_bode(result: FrequencyResponse, path: Path) -> None:
+    """The Bode diagram of each axis as a picture, PNG, SVG or PDF by the name's ending."""
+    figure = bode(result)
+    with atomic_writer(path) as file:
+        figure.savefig(file, format=path.suffix[1:] or "png", dpi=150)
+
+
+@figure_of.register(FrequencyResponse)
+def _figure(result: FrequencyResponse, coordinate: str | None, axis: str | None) -> Figure:
+    return bode(result)
+
+
+def bode(result: FrequencyResponse) -> Figure:
+    """Magnitude with its 90 % band, phase, and coherence of each axis; a column an axis."""
+    from matplotlib.figure import Figure
+
+    count = len(result.axes)
+    figure = Figure(figsize=(6.4 * count, 7.2), layout="constrained")
+    places = figure.subplots(3, count, sharex="col", squeeze=False, height_ratios=(3, 2, 1))
+    for column, (name, axis) in zip(places.T, result.axes.items(), strict=True):
+        _draw(column, axis)
+        column[0].set_title(f"axis {name}: force to position")
+    return figure
+
+
+def _draw(places: list[Axes], axis: AxisFrequency) -> None:
+    level, turn, share = places
+    unit = pretty(axis.units("m/N"))
+    pairs = (("measured", axis.measured), ("model", axis.modelled))
+    for (name, shown), ink in zip(pairs, INKS, strict=True):
+        if shown is None:
+            continue
+        found = shown.response.at(shown.response.tells)
+        size = np.abs(found.plant)
+        low = np.maximum(size - found.band, 1e-3 * size)
+        level.fill_between(found.frequency, low, size + found.band, color=ink, alpha=0.2, lw=0)
+        level.loglog(found.frequency, size, ".", ms=4, color=ink, label=f"{name}, 90 % band")
+        turn.semilogx(found.frequency, np.degrees(np.angle(found.plant)) % -360.0, ".", ms=4,
+                      color=ink)  # fmt: skip
+        if shown.plant is not None:
+            kept = shown.response.tells
+            fitted = shown.plant.fitted[kept]
+            level.loglog(
+                found.frequency, np.abs(fitted), lw=1, color=ink, label=f"{name}, read off"
+            )
+            turn.semilogx(found.frequency, np.degrees(np.angle(fitted)) % -360.0, lw=1, color=ink)
+        share.semilogx(shown.response.frequency, shown.response.coherence, lw=1, color=ink)
+    level.set_ylabel(f"Magnitude ({unit})")
+    turn.set_ylabel("Phase (degrees)")
+    share.set(ylabel="Coherence (1)", xlabel="Frequency (Hz)", ylim=(0.0, 1.05))
+    for place in places:
+        place.grid(True, which="both", alpha=0.25)
+    level.legend()

@@ -1,0 +1,182 @@
+"""The frequency response of machines whose own is known exactly; nothing of it is of the twin."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import identify
+from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
+from identify.frequency.loop import loop_of
+from identify.frequency.plant import Told, plant_of
+from identify.frequency.response import Record, response
+from identify.output.answers.answer import answer_of
+from tests.cli_runs import twin
+from twin.effects import load_catalogue
+from twin.errors import InputError
+from twin.experiments.named import simulate
+from twin.logs import AxisLog, Log, write_log
+from twin.model.file import load_model
+from twin.model.machine import Fitted, MachineModel
+from twin.signals import Array
+
+SAMPLES = 16_000
+MACHINE = TwoMasses()
+Setpoint = Callable[[int, np.random.Generator], Array]
+
+
+def recorded(setpoint: Setpoint, machine: TwoMasses = MACHINE, seed: int = 1) -> Record:
+    rng = np.random.default_rng(seed)
+    return machine.run(setpoint(SAMPLES, rng), rng)
+
+
+@pytest.mark.parametrize("setpoint", [multisine, wandering])
+def test_the_response_is_that_of_the_machine_and_its_band_holds_it(setpoint: Setpoint) -> None:
+    found = response([recorded(setpoint, seed=s) for s in range(3)])
+    told, true = found.tells, MACHINE.response(found.frequency)
+    assert np.count_nonzero(told) > 0.8 * len(told)
+    held = np.abs(found.plant - true)[told] < found.band[told]
+    assert 0.8 < held.mean() < 0.97
+    assert np.median(np.abs(found.plant / true - 1.0)[told]) < 0.02
+
+
+@pytest.mark.parametrize("setpoint", [multisine, wandering])
+@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.3e-3])
+def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float) -> None:
+    machine = replace(MACHINE, delay=delay)
+    plant = plant_of(response([recorded(setpoint, machine)]))
+    frequency, ratio = machine.resonance
+    (mode,) = plant.modes
+    assert plant.mass.value == pytest.approx(machine.mass, rel=0.01)
+    assert mode.frequency.value == pytest.approx(frequency, rel=0.01)
+    assert mode.damping.value == pytest.approx(ratio, rel=0.1)
+    assert plant.delay.value == pytest.approx(delay, abs=0.02 * machine.period)
+    assert mode.gain.value == pytest.approx(machine.load / machine.motor, rel=0.05)
+
+
+def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_not() -> None:
+    noisy = replace(MACHINE, noise=5e-5, load=1e-3)
+    records = [recorded(wandering, noisy, seed) for seed in range(10)]
+    with_it = response(records)
+    without = response([replace(record, setpoint=None) for record in records])
+    near = (with_it.frequency > 5.0) & (with_it.frequency < 30.0)
+    true = noisy.response(with_it.frequency)[near]
+    error = [np.median(np.abs(r.plant[near] / true - 1.0)) for r in (with_it, without)]
+    assert 2.0 * error[0] < error[1]
+
+
+def test_noise_and_what_is_not_linear_are_told_apart() -> None:
+    quiet, noisy = recorded(multisine), recorded(multisine, replace(MACHINE, noise=1e-6))
+    bent = replace(quiet, position=quiet.position + 2e3 * quiet.position**2)
+    shares = []
+    for record in (noisy, bent):
+        found = response([record])
+        shares.append(np.median((found.distortion / found.spread)[found.tells] ** 2))
+    assert shares[0] < 0.3 < 0.9 < shares[1]
+
+
+def test_the_margins_are_those_of_the_loop() -> None:
+    stiff = replace(MACHINE, load=1e-3)
+    found = response([recorded(wandering, stiff)])
+    own = stiff.controller(found.frequency)
+    exact = own * stiff.response(found.frequency)
+    told = loop_of(found, None)
+    known = loop_of(found, own)
+    assert told is not None
+    assert known is not None
+    peak = np.abs(1.0 / (1.0 + exact))[found.tells].max()
+    assert told.peak == pytest.approx(peak, rel=0.05)
+    assert known.peak == pytest.approx(peak, rel=0.05)
+    falls = np.flatnonzero((np.abs(exact[:-1]) > 1.0) & (np.abs(exact[1:]) <= 1.0))[-1]
+    low, high = found.frequency[falls : falls + 2]
+    assert 0.98 * low < told.crossover < 1.02 * high
+    assert told.phase_margin == pytest.approx(np.angle(-exact[falls]), abs=0.1)
+
+
+def test_what_cannot_be_told_is_refused_in_one_line() -> None:
+    record = recorded(wandering)
+    with pytest.raises(InputError, match="give logs of one rate"):
+        response([record, replace(record, period=2e-3)])
+    still = replace(record, position=1e-7 * np.random.default_rng(0).standard_normal(SAMPLES))
+    with pytest.raises(InputError, match="too few for a mass"):
+        plant_of(response([still]))
+
+
+# The command
+
+
+@pytest.fixture(scope="module")
+def elastic() -> MachineModel:
+    """A stage whose mass hangs in part on a spring, and whose command acts late."""
+    catalogue = load_catalogue()
+    model = load_model("proton_xy", catalogue)
+    model = replace(model, axes={"x": model.axes["x"]}, mjcf=None, mjcf_name=None)
+    axis = model.axes["x"]
+    for name, values in (
+        ("flexible_mode", {"load": 0.4, "frequency": 60.0, "damping": 0.03}),
+        ("actuator_delay", {"tau": 1.3e-3}),
+    ):
+        axis = axis.with_effect(Fitted.at_start(catalogue[name], values))
+    return model.with_axis("x", axis)
+
+
+@pytest.fixture(scope="module")
+def log(elastic: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("frf") / "multisine.mcap"
+    write_log(simulate(elastic, "multisine", duration=8.0, seed=3), path)
+    return path
+
+
+def test_twin_and_model_show_what_was_planted_in_spite_of_friction(
+    elastic: MachineModel, log: Path
+) -> None:
+    found = identify.frequency_response(log, elastic).axes["x"]
+    for shown in (found.measured, found.modelled):
+        assert shown is not None
+        assert shown.plant is not None
+        (mode,) = shown.plant.modes
+        assert shown.plant.mass.value == pytest.approx(elastic.axes["x"].mass, rel=0.02)
+        assert mode.frequency.value == pytest.approx(60.0 / np.sqrt(0.6), rel=0.01)
+        assert mode.damping.value == pytest.approx(0.03 / np.sqrt(0.6), rel=0.1)
+        assert shown.plant.delay.value == pytest.approx(1.3e-3, abs=2e-5)
+
+
+def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
+    table, picture = tmp_path / "r.csv", tmp_path / "bode.png"
+    done = twin("frf", log, "-o", table, "--plot", picture, folder=tmp_path)
+    assert "resonance: 77" in done.stdout
+    assert re.search(r"delay: 1\.(29|30)", done.stdout)
+    head, *lines = table.read_text().splitlines()
+    assert head.startswith("axis,source,frequency (Hz),real (m/N)")
+    assert len(lines) > 50
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    answer = twin("frf", log, "--json", folder=tmp_path)
+    plant = json.loads(answer.stdout)["axes"]["x"]["measured"]["plant"]
+    assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
+
+
+def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rest.mcap"
+    still = {n: np.zeros(4000) for n in ("position", "setpoint_position", "force")}
+    write_log(Log(1000.0, {"x": AxisLog(still)}), path)
+    with pytest.raises(InputError, match="no axis moves"):
+        identify.frequency_response(path)
+
+
+def test_a_response_is_python_controls_frd() -> None:
+    control = pytest.importorskip("control")
+    record = recorded(wandering)
+    log = Log(1.0 / record.period, {"x": AxisLog({
+        "setpoint_position": record.setpoint, "force": record.force, "position": record.position,
+    })})  # fmt: skip
+    found = identify.frequency_response(log)
+    frd = found.to_frd("x")
+    assert isinstance(frd, control.FRD)
+    assert answer_of(found)
+    assert isinstance(found.axes["x"].measured.plant.mass, Told)
