@@ -85,10 +85,17 @@ def plant_of(found: Response, most: int = 4) -> Plant:
         # Twice the fall of the cost is that of a log likelihood; three values more.
         if best.cost - better.cost < 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic:
             break
-        if any(abs(m.gain.value) < m.gain.band for m in _read(found, told, better).modes):
-            break  # one may be none
+        if not all(_is_seen(mode, told) for mode in _read(found, told, better).modes):
+            break
         best = better
     return _read(found, told, best)
+
+
+def _is_seen(mode: Mode, told: Response) -> bool:
+    """Whether a mode is surely there, and both its sides are among the frequencies that are told."""
+    low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
+    first, last = told.frequency[[0, -1]] / mode.frequency.value
+    return bool(abs(mode.gain.value) > mode.gain.band and first < low and high < last)
 
 
 @dataclass(frozen=True, eq=False)
