@@ -92,7 +92,7 @@ def plant_of(found: Response, most: int = 4) -> Plant:
 
 
 def _is_seen(mode: Mode, told: Response) -> bool:
-    """Whether a mode is surely there, and both its sides are among the frequencies that are told."""
+    """Whether a mode is surely there, and both its sides are among the frequencies told."""
     low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
     first, last = told.frequency[[0, -1]] / mode.frequency.value
     return bool(abs(mode.gain.value) > mode.gain.band and first < low and high < last)
