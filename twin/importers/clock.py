@@ -83,7 +83,7 @@ class Clock:
     def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
         """What the clock costs each signal of a map, one sentence."""
         each = [
-            f"{axis}.{field} {c.si.size * abs(c.scale) * self.cost(columns[c.name]):.2g} "
+            f"{axis}.{field} {c.si.size * abs(float(c.scale)) * self.cost(columns[c.name]):.2g} "
             f"{entry.units[field]}"
             for axis, entry in mapping.axes.items()
             for field, c in entry.columns.items()

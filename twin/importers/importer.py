@@ -53,7 +53,8 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
 
 
 def _of_one(path: Path, mapping: ImportMap) -> Log:
-    table, columns, facts = _read(path, mapping)
+    table, columns, facts, scalars = _read(path, mapping)
+    mapping = mapping.scaled_by(scalars)
     facts |= _start(table, mapping, columns)
     if mapping.resample is None or mapping.time is None:
         return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
@@ -77,7 +78,8 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
         with reading(path):
-            table, columns, of_file = _read(path, own)
+            table, columns, of_file, scalars = _read(path, own)
+            own, mapping = own.scaled_by(scalars), mapping.scaled_by(scalars)
             times = _times(table, own, columns) + files[number - 1].offset
             clocks.append((own, columns, clock_of(times, rate)))
         facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
@@ -117,15 +119,31 @@ def table_of(path: Path, mapping: ImportMap) -> Table:
     return FORMATS[_format_name(path, mapping)][1](path, mapping)
 
 
-def _read(path: Path, mapping: ImportMap) -> tuple[Table, Mapping[str, Array], dict[str, str]]:
-    """The table, its columns as numbers, and format and sha256 of the file."""
+def _read(
+    path: Path, mapping: ImportMap
+) -> tuple[Table, Mapping[str, Array], dict[str, str], dict[str, float]]:
+    """The table, its columns as numbers, format and sha256 of the file, and scalars by name."""
     name = _format_name(path, mapping)
     with open(path, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     table = table_of(path, mapping)
     columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
+    scalars = {n: _scalar(n, columns[n]) for n in mapping.scalars()}
+    signals = {c.name for c in mapping.columns()} | ({mapping.time.name} if mapping.time else set())
+    columns = {n: c for n, c in columns.items() if n in signals}
     _common_length(columns)
-    return table, columns, {"original_format": name, "original_sha256": digest}
+    return table, columns, {"original_format": name, "original_sha256": digest}, scalars
+
+
+def _scalar(name: str, values: Array) -> float:
+    """The value of a column with one alone; raises InputError."""
+    if len(values) and np.ptp(values) == 0.0 and values[0] != 0.0 and np.isfinite(values[0]):
+        return float(values[0])
+    low, high = (float(f(values, initial=np.nan)) for f in (np.fmin.reduce, np.fmax.reduce))
+    raise InputError(
+        f"scale = '{name}': holds {low:g} to {high:g}; name a scalar of the file other than 0, or "
+        "give a number"
+    )
 
 
 def _log(

@@ -5,14 +5,14 @@
     [axes.x]
     force_constant = 53.4                 # N/A, optional
     position = {column = "qm", unit = "mm"}
-    force = {column = "drive", unit = "V", scale = 35.15}     # N a volt
+    force = {column = "drive", unit = "V", scale = 35.15}     # N a volt; or scale = "gtau"
     gear = {x = 32.0}                     # the columns are those of a motor, 32 turns for one
 
 Several files are given in the order of [[files]] tables, each with time or sample_rate and an
 offset (s) that is added to its times; a column of the second one says file = 2.
 
 SI value = sign x (scale x raw + offset) x unit. A quantity in volts or counts is brought to SI by
-its scale, and its offset is in SI. ``delay_samples``: by how many whole samples the column was
+its scale, and its offset is in SI. A scale may be the name of a scalar of the file. ``delay_samples``: by how many whole samples the column was
 recorded too late; it is moved back by as many.
 """
 
@@ -64,7 +64,9 @@ class ColumnMap(_Column):
     """The column of a signal: SI value = sign x (scale x raw + offset) x unit."""
 
     unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
-    scale: float = Field(1.0, description=NUMBER + " other than 0: SI units a raw one")
+    scale: float | str = Field(
+        1.0, description=NUMBER + " other than 0: SI units a raw one; or a scalar of the file"
+    )
     offset: float = Field(0.0, description=NUMBER + ", in the unit; in SI where a scale brings it")
     sign: Literal[1, -1] = Field(1, description="1 or -1")
     delay_samples: int = Field(
@@ -93,12 +95,23 @@ class ColumnMap(_Column):
             raise InputError(f"unit '{self.unit}' needs a scale: how much one of it is in SI")
         if self.scale == 0.0:
             raise InputError("scale = 0: give a number other than 0")
+        if isinstance(self.scale, str) and not self.scale.strip("+-.0123456789eE"):
+            raise InputError(
+                f"scale = '{self.scale}': give a finite number without quotes, or the name of a "
+                "scalar of the file"
+            )
 
     def to_si(self, raw: Array) -> Array:
         """Values (n,) of the column in SI."""
         factor = self.sign * self.si.size
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused later
-            return np.asarray(factor * self.scale * raw + factor * self.offset)
+            return np.asarray(factor * float(self.scale) * raw + factor * self.offset)
+
+    def scaled_by(self, scalars: Mapping[str, float]) -> ColumnMap:
+        """The same with the scalar of the file that its scale names, where that is among these."""
+        if not isinstance(self.scale, str) or self.scale not in scalars:
+            return self
+        return self.model_copy(update={"scale": scalars[self.scale]})
 
 
 _SIGNAL: Any = Field(None, description='a table such as {column = "name in the file", unit = "mm"}')
@@ -137,6 +150,12 @@ class AxisMap(Entries):
         """The same with the columns of one of several files alone."""
         others = {field: None for field, c in self.columns.items() if c.file != number}
         return self.model_copy(update=others)
+
+    def scaled_by(self, scalars: Mapping[str, float]) -> AxisMap:
+        """The same with the scalars of a file in the scales that name them."""
+        return self.model_copy(
+            update={field: c.scaled_by(scalars) for field, c in self.columns.items()}
+        )
 
     def require_signals(self) -> None:
         """Find the units; raises InputError where one or a signal is missing or of another kind."""
@@ -204,7 +223,16 @@ class ImportMap(_File):
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""
         names = [self.time.name] if self.time else []
-        return tuple(dict.fromkeys([*names, *(c.name for c in self.columns())]))
+        return tuple(dict.fromkeys([*names, *(c.name for c in self.columns()), *self.scalars()]))
+
+    def scalars(self) -> tuple[str, ...]:
+        """The scalars of a file that scales name."""
+        return tuple(dict.fromkeys(c.scale for c in self.columns() if isinstance(c.scale, str)))
+
+    def scaled_by(self, scalars: Mapping[str, float]) -> ImportMap:
+        """The same with these scalars in the scales that name them."""
+        axes = {name: axis.scaled_by(scalars) for name, axis in self.axes.items()}
+        return self.model_copy(update={"axes": axes})
 
     def of_file(self, number: int) -> ImportMap:
         """The map of one of several files; raises InputError where no signal is in it."""

@@ -345,3 +345,17 @@ def test_a_message_lists_forty_columns_and_counts_the_others(count):
     assert str(caught.value).count("column") == 2 + min(count, 40)
     tail = str(caught.value).rpartition("column39")[2]
     assert tail == ("" if count == 40 else f" and {count - 40} more")
+
+
+def test_a_scale_may_be_a_scalar_of_the_file(tmp_path: Path) -> None:
+    raw = np.sin(np.arange(50.0))
+    file = tmp_path / "run.mat"
+    write_mat(file, {"q": raw, "u": 2.0 * raw})  # and gain = 3
+    text = (
+        "sample_rate = 100.0\n[axes.x]\nposition = {column = 'q', unit = 'm'}\n"
+        "force = {column = 'u', unit = 'V', scale = 'gain'}\n"
+    )
+    assert import_log(file, mapping(tmp_path, text)).axes["x"].force == pytest.approx(6.0 * raw)
+    for name, said in (("q", "name a scalar"), ("gian", "no column 'gian'; did you mean 'gain'")):
+        with pytest.raises(InputError, match=said):
+            import_log(file, mapping(tmp_path, text.replace("gain", name)))
