@@ -12,8 +12,9 @@ Several files are given in the order of [[files]] tables, each with time or samp
 offset (s) that is added to its times; a column of the second one says file = 2.
 
 SI value = sign x (scale x raw + offset) x unit. A quantity in volts or counts is brought to SI by
-its scale, and its offset is in SI. A scale may be the name of a scalar of the file. ``delay_samples``: by how many whole samples the column was
-recorded too late; it is moved back by as many.
+its scale, and its offset is in SI. A scale may be the name of a scalar of the file.
+``delay_samples``: by how many whole samples the column was recorded too late; it is moved back by
+as many.
 """
 
 from __future__ import annotations
