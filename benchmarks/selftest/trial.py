@@ -42,9 +42,9 @@ NEARLY = 0.8  # part of the strongest dependence from which a coordinate counts 
 class Answer:
     """A finding of the diagnosis, and whether it is right.
 
-    names: the effect, and those declared as ambiguous with it. part: of what was left, from which
-    its confidence is read. confidence: stated, 0..1. coordinate: that of the curve which
-    it shows, where a law has another shape.
+    names: the effect, and those declared as ambiguous with it. part, t: of its score, from which
+    its confidence is read. confidence: stated, 0..1. coordinate: that of the curve which it shows,
+    where a law has another shape.
     """
 
     names: tuple[str, ...]
@@ -53,6 +53,7 @@ class Answer:
     part: float = np.nan
     confidence: float = np.nan
     coordinate: str | None = None
+    t: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,7 @@ def answer_of(finding: Finding, made: Machine, case: Case) -> Answer:
             right |= any(f.effect.name in names and _is_another(f) for f in made.planted)
     over = OVER[finding.shape.over] if finding.shape else None
     sure = np.nan if finding.confidence is None else finding.confidence
-    return Answer(names, finding.kind, right, finding.score.part, sure, over)
+    return Answer(names, finding.kind, right, finding.score.part, sure, over, finding.score.t)
 
 
 def _is_another(planted: Fitted) -> bool:

@@ -14,7 +14,13 @@ import numpy as np
 
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import Motion, bodies_along, motion_of
+from identify.dataset.motion import (
+    LONGEST_BLOCK,
+    SHORTEST_BLOCK,
+    Motion,
+    bodies_along,
+    motion_of,
+)
 from identify.dataset.prepared_log import at_rest
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
@@ -27,7 +33,7 @@ from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 from twin.signals import Array
 
-LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
+LENGTHS = (0.1, 0.05, 0.02, 0.01)  # s, of the test functions: the first that tells the mass
 BLOCKS = 30  # of time, for the scatter of a value
 SURE = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
 LEAST_INERTIAL = 0.005  # of the force's RMS; below, friction that is not known hides the inertia
@@ -228,12 +234,19 @@ def first_model(
         going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
         if going:
             ripples = ripples_of_widest(going.values(), axis)
-            motions = [
-                motion_of(log, axis, n, ripples=ripples, bodies=taken[n].get(axis))
-                for n, log in going.items()
-            ]
+            # Long blocks hide an axis that swings within them, and of short ones noise hides more.
+            for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
+                motions = [
+                    motion_of(log, axis, n, (), longest, ripples, taken[n].get(axis))
+                    for n, log in going.items()
+                ]
+                found = first_values(motions)
+                if found.mass is not None:
+                    break
             constant = next(iter(going.values())).axes[axis].force_constant
-            axes[axis] = _first_axis(axis, motions, constant, catalogue, begun.axes.get(axis))
+            axes[axis] = _first_axis(
+                axis, motions, found, constant, catalogue, begun.axes.get(axis)
+            )
     if not axes:
         raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
     return replace(begun, axes={**begun.axes, **axes})
@@ -264,12 +277,13 @@ def not_determined(axis: AxisModel) -> list[str]:
 def _first_axis(
     axis: str,
     motions: Sequence[Motion],
+    found: FirstValues,
     force_constant: float | None,
     catalogue: Catalogue,
     joint: AxisModel | None,
 ) -> AxisModel:
     """joint: the axis without effects where it is a joint, whose inertia is known."""
-    found, covered, units = first_values(motions), excitation(motions, None), motions[0].units
+    covered, units = excitation(motions, None), motions[0].units
     if found.mass is None and joint is None:
         names = ", ".join(m.name for m in motions)
         raise InputError(
