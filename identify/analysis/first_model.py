@@ -33,7 +33,7 @@ from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 from twin.signals import Array
 
-LENGTHS = (0.1, 0.05, 0.02, 0.01)  # s, of the test functions: the first that tells the mass
+LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
 BLOCKS = 30  # of time, for the scatter of a value
 SURE = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
 LEAST_INERTIAL = 0.005  # of the force's RMS; below, friction that is not known hides the inertia

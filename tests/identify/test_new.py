@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_runs import twin
+from scipy.signal import butter, cont2discrete, lfilter
 
 from identify.analysis.first_model import first_model, not_determined
+from twin.checks import Fault, check_log
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
@@ -169,3 +171,14 @@ def test_the_commands_of_a_new_machine(tmp_path):
     assert axis.mass == pytest.approx(MASS, rel=0.05)
     for wrong in (("import", "run.csv"), ("import", "--guess", "run.csv", "run.csv")):
         assert twin(*wrong, folder=tmp_path).returncode == 2
+
+
+def test_an_oscillator_that_swings_within_a_block_has_its_mass_and_no_uneven_clock() -> None:
+    rate, spring, mass, loss = 600.0, 1.0, 5e-6, 1e-4  # 71 Hz
+    force = lfilter(*butter(4, 0.6), np.random.default_rng(4).standard_normal(40 * 600))
+    plant = cont2discrete(([1.0], [mass, loss, spring]), 1.0 / rate)
+    position = lfilter(plant[0][0], plant[1], force)
+    position += 1e-3 * np.std(position) * np.random.default_rng(5).standard_normal(len(force))
+    log = Log(rate, {"a": AxisLog({"position": position, "force": force})})
+    assert Fault.UNEVEN not in {f.fault for f in check_log(log).findings}
+    assert first_model({"l": log}, "m", CATALOGUE).axes["a"].mass == pytest.approx(mass, rel=0.15)

@@ -12,7 +12,7 @@ from twin.checks import limits
 from twin.checks.explain import Dynamics, Lag, Smoother, Trend, find_lag, find_trend, fit_dynamics
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
-from twin.signals import Array, median, white_noise
+from twin.signals import Array, median, usual_size, white_noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,9 @@ class Axis:
         """Largest second difference of the position, in m, that motion and noise explain."""
         usual = float(np.quantile(np.abs(self.acceleration), 0.99))
         noise = limits.JUMP_NOISE * 6**0.5 * self.position_noise
-        return limits.IMPOSSIBLE * usual / self.sample_rate**2 + noise
+        possible = limits.IMPOSSIBLE * usual / self.sample_rate**2 + noise
+        # What swings within the samples that were smoothed bends as much at half of them all.
+        return max(possible, limits.UNUSUAL * usual_size(np.diff(self.log.position, 2)))
 
     @cached_property
     def jumps(self) -> Array:
