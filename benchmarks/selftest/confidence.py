@@ -1,15 +1,15 @@
-"""The table of confidence: python -m benchmarks confidence --seed N [--rows FILE...].
+"""The tables of confidence: python -m benchmarks confidence --seed N [--rows FILE...].
 
 Answers of the self-test, and rows that `benchmarks foreign` and `benchmarks withheld` wrote with
--o, are halved machine by machine. The table is fitted on one half and judged on the other, and the
-other way round; then the table of all of them is printed for identify/selection/confidence.py.
+-o, are halved machine by machine. The tables are fitted on one half and judged on the other, and
+the other way round; then those of all of them are printed for identify/selection/confidence.py.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from benchmarks.selftest.design import DEVELOPMENT, FULL, run_all
 from benchmarks.selftest.tally import answers_of
 from benchmarks.selftest.trial import Answer, TrialResult
 from benchmarks.selftest.words import tell
-from identify.selection.confidence import Level
+from identify.selection.confidence import Level, read
 from identify.selection.findings import FindingKind
 
 LEAST_ANSWERS = 30  # to a level: a rate of them is known to some 10 points
@@ -45,22 +45,32 @@ def of_rows(lines: Iterable[str], source: str) -> list[Machine]:
     out = []
     for row in map(json.loads, lines):
         answers = tuple(
-            Answer((f["effect"], *f["tied"]), FindingKind(f["kind"]), f["mark"] != WRONG, f["part"])
+            Answer(
+                (f["effect"], *f["tied"]),
+                FindingKind(f["kind"]),
+                f["mark"] != WRONG,
+                f["part"],
+                t=f["t"],
+            )
             for f in row["findings"]
         )
         out.append(Machine(source, answers))
     return out
 
 
-def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
-    """How often answers were right by the part they took: a falling staircase of a few levels.
+Figure = Callable[[Answer], float]
+FIGURES: dict[str, Figure] = {"BY_PART": lambda a: a.part, "BY_T": lambda a: a.t}
+
+
+def levels(answers: Sequence[Answer], figure: Figure) -> tuple[Level, ...]:
+    """How often answers were right by a figure of their score: a falling staircase of a few levels.
 
     Levels hold equally many answers, at least LEAST_ANSWERS; one that is not below the one before
     is joined with it (isotonic regression: pool adjacent violators, R. E. Barlow et al.,
     Statistical Inference under Order Restrictions, 1972). The rate of a level is (right + 1) /
     (answers + 2), Laplace's rule, so that none is certain. The last has no end.
     """
-    ordered = sorted(answers, key=lambda a: -a.part)
+    ordered = sorted(answers, key=lambda a: -figure(a))
     count = max(len(ordered) // LEAST_ANSWERS, 1)
     pooled: list[list[Answer]] = []
     for part in np.array_split(np.arange(len(ordered)), count):
@@ -68,7 +78,7 @@ def levels(answers: Sequence[Answer]) -> tuple[Level, ...]:
         while len(pooled) > 1 and _rate(pooled[-1]) >= _rate(pooled[-2]):
             last = pooled.pop()
             pooled[-1] += last
-    ends = [group[-1].part for group in pooled[:-1]] + [0.0]
+    ends = [figure(group[-1]) for group in pooled[:-1]] + [0.0]
     return tuple(Level(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
 
 
@@ -77,36 +87,38 @@ def _rate(answers: Sequence[Answer]) -> float:
 
 
 def judged(fitted: Sequence[Machine], others: Sequence[Machine]) -> list[str]:
-    """By source and level of a table, stated confidence and how often others were right."""
-    table, lines = levels([a for m in fitted for a in m.answers]), []
+    """By source and stated confidence, how often others were right."""
+    lines = []
+    every = [a for m in fitted for a in m.answers]
+    tables = [(figure, levels(every, figure)) for figure in FIGURES.values()]
     for source in dict.fromkeys(m.source for m in others):
-        answers = [a for m in others if m.source == source for a in m.answers]
-        top = np.inf
-        for level in table:
-            inside = [a.right for a in answers if level.part <= a.part < top]
-            top = level.part
-            if inside:
-                lines.append(
-                    f"{source}: part from {level.part:.2f}, stated {level.right:.2f}, right "
-                    f"{sum(inside)} of {len(inside)}"
-                )
+        found: dict[float, list[bool]] = {}
+        for a in (a for m in others if m.source == source for a in m.answers):
+            stated = min(read(table, figure(a)) for figure, table in tables)
+            found.setdefault(stated, []).append(a.right)
+        lines += [
+            f"{source}: stated {stated:.2f}, right {sum(right)} of {len(right)}"
+            for stated, right in sorted(found.items(), reverse=True)
+        ]
     return lines
 
 
-def table_of(machines: Sequence[Machine]) -> str:
-    """The table of all machines, as Python text."""
+def tables_of(machines: Sequence[Machine]) -> str:
+    """The tables of all machines, as Python text."""
     answers = [a for m in machines for a in m.answers]
-    found: Sequence[Level] = levels(answers)
-    steps = ", ".join(f"Level({v.part:.2f}, {v.right:.2f})" for v in found)
-    return f"LEVELS = ({steps})  # {len(answers)} answers"
+    lines = []
+    for name, figure in FIGURES.items():
+        steps = ", ".join(f"Level({v.least:.2f}, {v.right:.2f})" for v in levels(answers, figure))
+        lines.append(f"{name} = ({steps})  # {len(answers)} answers")
+    return "\n".join(lines)
 
 
 def report(machines: Sequence[Machine]) -> str:
-    """Both halves, each judged with the table of the other, and the table of all."""
+    """Both halves, each judged with the tables of the other, and the tables of all."""
     order = np.random.default_rng(SPLIT).permutation(len(machines))
     halves = [[machines[i] for i in part] for part in np.array_split(order, 2)]
     first, second = halves
-    return "\n".join((*judged(first, second), *judged(second, first), table_of(machines)))
+    return "\n".join((*judged(first, second), *judged(second, first), tables_of(machines)))
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -109,11 +109,14 @@ def _figure(result: FrequencyResponse, coordinate: str | None, axis: str | None)
 
 def bode(result: FrequencyResponse) -> Figure:
     """Magnitude with its 90 % band, phase, and coherence of each axis; a column an axis."""
-    from matplotlib.figure import Figure
+    import matplotlib.pyplot as plt
 
     count = len(result.axes)
-    figure = Figure(figsize=(6.4 * count, 7.2), layout="constrained")
-    places = figure.subplots(3, count, sharex="col", squeeze=False, height_ratios=(3, 2, 1))
+    figure, places = plt.subplots(
+        3, count, sharex="col", squeeze=False, height_ratios=(3, 2, 1),
+        figsize=(6.4 * count, 7.2), layout="constrained",
+    )  # fmt: skip
+    plt.close(figure)  # a notebook shows what is returned, once
     for column, (name, axis) in zip(places.T, result.axes.items(), strict=True):
         _draw(column, axis)
         column[0].set_title(f"axis {name}: force to position")

@@ -77,7 +77,7 @@ class Finding:
     @property
     def confidence(self) -> float | None:
         """How often such an answer was right, 0..1; None where test logs contradict it."""
-        return None if self.contradicted else confidence(self.score.part)
+        return None if self.contradicted else confidence(self.score.part, self.score.t)
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:

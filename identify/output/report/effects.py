@@ -81,7 +81,7 @@ def found(view: AxisView) -> list[Block]:
     caption = (
         f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
         "others refitted, which can stand in for it: the shares need not add up. The same force "
-        "shifted in time cannot be real. Right: of answers in the self-test."
+        "shifted in time cannot be real. Right: of answers where the truth is known."
     )
     return [Table(titles, rows, view.words(caption))]
 

@@ -37,7 +37,9 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
         said.append("No confidence is stated, as the test logs do not confirm it")
     else:
         right = percent(finding.confidence)
-        said.append(f"{right} of answers that remove so much were right in the self-test")
+        said.append(
+            f"{right} of answers that remove so much as surely were right where the truth is known"
+        )
     return tuple(words(text) for text in said)
 
 

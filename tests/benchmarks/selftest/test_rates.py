@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.selftest.confidence import LEAST_ANSWERS, levels
+from benchmarks.selftest.confidence import FIGURES, LEAST_ANSWERS, levels
 from benchmarks.selftest.laws import OUTSIDE
 from benchmarks.selftest.machines import Case
 from benchmarks.selftest.tally import (
@@ -28,7 +28,7 @@ from benchmarks.selftest.words import (
     target_in_words,
     trial_in_words,
 )
-from identify.selection.confidence import LEVELS, Level
+from identify.selection.confidence import BY_PART, BY_T, Level, confidence, read
 from identify.selection.findings import FindingKind
 
 FOREIGN = next(iter(OUTSIDE))
@@ -200,6 +200,9 @@ def test_an_outcome_in_words():
 # --- confidence ------------------------------------------------------------------------------
 
 
+PART = FIGURES["BY_PART"]
+
+
 def answers(count: int, seed: int) -> list[Answer]:
     """Right with a chance that is the part they took."""
     rng = np.random.default_rng(seed)
@@ -209,30 +212,33 @@ def answers(count: int, seed: int) -> list[Answer]:
     ]
 
 
-def test_the_table_that_is_shipped_falls_and_has_no_end() -> None:
-    right = [level.right for level in LEVELS]
+@pytest.mark.parametrize("table", [BY_PART, BY_T])
+def test_a_table_that_is_shipped_falls_and_has_no_end(table: tuple[Level, ...]) -> None:
+    right = [level.right for level in table]
     assert right == sorted(right, reverse=True)
     assert all(0.0 < r < 1.0 for r in right)
-    assert LEVELS[-1].part == 0.0
+    assert table[-1].least == 0.0
+
+
+def test_a_gain_near_chance_is_not_stated_with_confidence_whatever_it_takes() -> None:
+    assert confidence(1.0, 1.7) < 0.8 < confidence(1.0, 10.0)
+    assert confidence(0.3, 10.0) < confidence(1.0, 10.0)
 
 
 def test_levels_fall_and_are_as_many_as_the_answers_allow() -> None:
-    few, some, many = (levels(answers(n, 3)) for n in (LEAST_ANSWERS - 1, 65, 4000))
+    few, some, many = (levels(answers(n, 3), PART) for n in (LEAST_ANSWERS - 1, 65, 4000))
     assert len(few) == 1
     assert len(some) <= 2
     assert 10 < len(many) <= 4000 // LEAST_ANSWERS
     right = [v.right for v in many]
     assert right == sorted(right, reverse=True)
     assert len(set(right)) == len(right)
-    assert levels([]) == (Level(0.0, 0.5),)
+    assert levels([], PART) == (Level(0.0, 0.5),)
 
 
 def test_a_table_of_some_answers_holds_on_others() -> None:
-    table = levels(answers(4000, 1))
-    judged = [
-        replace(a, confidence=next(v.right for v in table if a.part >= v.part))
-        for a in answers(4000, 2)
-    ]
+    table = levels(answers(4000, 1), PART)
+    judged = [replace(a, confidence=read(table, a.part)) for a in answers(4000, 2)]
     found = reliability([TrialResult(Case(("a",), 5.0, 1), answers=tuple(judged))])
     assert sum(t.right.trials for t in found) == 4000
     for tenth in found:
