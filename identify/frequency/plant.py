@@ -24,7 +24,7 @@ from twin.errors import InputError
 from twin.signals import Array
 
 SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
-DAMPING = (1e-4, 0.005, 0.05, 0.5)  # of a mode: least, two at which it is sought, and most
+DAMPING = (1e-4, 0.005, 0.05, 0.3)  # of a mode: least, two at which it is sought, and most
 NEAREST = 0.01  # of a response: the error that a polynomial over a resonance may have of its own
 
 
@@ -92,10 +92,14 @@ def plant_of(found: Response, most: int = 4) -> Plant:
 
 
 def _is_seen(mode: Mode, told: Response) -> bool:
-    """Whether a mode is surely there, and both its sides are among the frequencies told."""
+    """Whether a mode is surely there, and both its sides are among the frequencies told.
+
+    What is as damped as one may be is none: it has no peak.
+    """
     low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
     first, last = told.frequency[[0, -1]] / mode.frequency.value
-    return bool(abs(mode.gain.value) > mode.gain.band and first < low and high < last)
+    peaks = mode.damping.value < 0.99 * DAMPING[-1]
+    return bool(peaks and abs(mode.gain.value) > mode.gain.band and first < low and high < last)
 
 
 @dataclass(frozen=True, eq=False)

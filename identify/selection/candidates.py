@@ -143,7 +143,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
             return "the motion repeats with it, so that any force of the motion could be it"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
-    if not any(max(m, fit.axis.mass) <= MOST_INERTIA * min(m, fit.axis.mass) for m in masses):
+    if not any(m <= MOST_INERTIA * fit.axis.mass for m in masses):
         return "it takes the place of the inertia"
     return None
 

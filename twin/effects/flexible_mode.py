@@ -29,9 +29,12 @@ def attach(mount, values):
 
 
 def frequencies(e: Excitation) -> tuple[float, ...]:
-    """Frequencies to try: steps of an eighth, up to what the log's blocks resolve."""
+    """Frequencies to try: steps of an eighth, up to what the log's blocks resolve.
+
+    From those of joints behind gears on.
+    """
     highest = max(min(400.0, 0.25 / e.period), 20.0)
-    return tuple(10.0 * 1.125**k for k in range(int(log(highest / 10.0) / log(1.125)) + 1))
+    return tuple(4.0 * 1.125**k for k in range(int(log(highest / 4.0) / log(1.125)) + 1))
 
 
 EFFECT = Effect(

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 import identify
 from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
@@ -62,7 +63,7 @@ def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float)
 
 def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_not() -> None:
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
-    records = [recorded(wandering, noisy, seed) for seed in range(10)]
+    records = [recorded(wandering, noisy, seed) for seed in range(6)]
     with_it = response(records)
     without = response([replace(record, setpoint=None) for record in records])
     near = (with_it.frequency > 5.0) & (with_it.frequency < 30.0)
@@ -106,6 +107,37 @@ def test_what_cannot_be_told_is_refused_in_one_line() -> None:
     still = replace(record, position=1e-7 * np.random.default_rng(0).standard_normal(SAMPLES))
     with pytest.raises(InputError, match="too few for a mass"):
         plant_of(response([still]))
+
+
+# A joint behind an elastic gear: a rigid fit makes a mass or a delay of it
+
+
+@pytest.fixture(scope="module", params=[pytest.param(8.0, marks=pytest.mark.slow), 12.0])
+def geared(request: pytest.FixtureRequest) -> tuple[TwoMasses, list[Log]]:
+    machine = TwoMasses(
+        motor=1.0, load=2.0, frequency=request.param, ratio=0.05, delay=0.0, bandwidth=4.0
+    )
+    logs = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        wanted = 1e-2 * lfilter(*butter(2, 0.016), rng.standard_normal(SAMPLES))
+        done = machine.run(wanted, rng)
+        columns = {"setpoint_position": wanted, "position": done.position, "force": done.force}
+        logs.append(Log(1.0 / machine.period, {"q": AxisLog(columns)}))
+    return machine, logs
+
+
+def test_an_elastic_gear_is_seen_through_and_named(geared: tuple[TwoMasses, list[Log]]) -> None:
+    machine, logs = geared
+    plant = identify.frequency_response(logs).axes["q"].measured.plant
+    assert plant is not None
+    (mode,) = plant.modes
+    assert mode.frequency.value == pytest.approx(machine.resonance[0], rel=0.01)
+    assert plant.mass.value == pytest.approx(machine.mass, rel=0.02)
+    found = identify.diagnose(identify.first_model(logs[0]), *logs).axes["q"]
+    ((name, *tied),) = found.answers
+    assert "flexible_mode" in (name, *tied)
+    assert found.missing[0].parameters["frequency"] == pytest.approx(machine.frequency, rel=0.01)
 
 
 # The command
