@@ -33,8 +33,9 @@ BY_PART = (
     Level(0.59, 0.94),
     Level(0.0, 0.87),
 )
-# Of 206 answers, of 130 machines of the self-test, 48 drives of another simulator and the 13: where
-# t was below 3, 10 of 16 were right, up to 4 16 of 17, beyond nearly all; (right + 1)/(answers + 2).
+# Of 206 answers, of 130 machines of the self-test, 48 drives of another simulator and the 13 real
+# ones: with t below 3, 10 of 16 were right, below 4 16 of 17, beyond nearly all. The rates are
+# (right + 1)/(answers + 2).
 BY_T = (Level(4.0, 0.99), Level(3.0, 0.89), Level(0.0, 0.61))
 
 

@@ -63,13 +63,13 @@ def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float)
 
 def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_not() -> None:
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
-    records = [recorded(wandering, noisy, seed) for seed in range(6)]
+    records = [recorded(wandering, noisy, seed) for seed in range(3)]
     with_it = response(records)
     without = response([replace(record, setpoint=None) for record in records])
     near = (with_it.frequency > 5.0) & (with_it.frequency < 30.0)
     true = noisy.response(with_it.frequency)[near]
-    error = [np.median(np.abs(r.plant[near] / true - 1.0)) for r in (with_it, without)]
-    assert 2.0 * error[0] < error[1]
+    error = [abs(np.mean(r.plant[near] / true - 1.0)) for r in (with_it, without)]
+    assert 4.0 * error[0] < error[1]
 
 
 def test_noise_and_what_is_not_linear_are_told_apart() -> None:
