@@ -215,14 +215,13 @@ class _Tried:
 
 
 def _steps(products: Array, leave_out: bool = False) -> Array:
-    """Steps (b, p - 1) that minimise the squared force; each block's by the others if left out."""
+    """Step (1, p - 1) that minimises the squared force; (b, p - 1), by the others, if left out."""
     whole = products.sum(axis=0)
     penalty = np.eye(len(whole) - 1)
     if leave_out:
         others = whole - products
         return np.linalg.solve(others[:, 1:, 1:] + penalty, others[:, 1:, :1])[..., 0]
-    step = np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])
-    return np.broadcast_to(step, (len(products), len(step)))
+    return np.linalg.solve(whole[1:, 1:] + penalty, whole[1:, 0])[None]
 
 
 def _parts(part: _Part, products: Array, steps: Array, without: Array, quiet: float) -> float:
@@ -235,7 +234,7 @@ def _parts(part: _Part, products: Array, steps: Array, without: Array, quiet: fl
 
 
 def _squares(products: Array, steps: Array) -> Array:
-    """What steps (b, p - 1) leave of the squared force, (b,) N^2, by products (b, p, p).
+    """What steps (b or 1, p - 1) leave of the squared force, (b,) N^2, by products (b, p, p).
 
     Force is F, a column X, a step s, and what is left |F - X s|^2.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,12 +34,14 @@ from identify.validation.misfit_maps import (
     worst_regions,
 )
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
+from twin.errors import CannotRun
 from twin.logs import write_topics
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import spread
 from twin.signals import Array
 
+LOGGER = logging.getLogger("identify")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AxisComparison:
@@ -142,15 +145,19 @@ def position_errors(
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
     """Free-running position error, and that of noise alone: axis -> log -> m RMS.
 
-    There is none where the motion is imposed.
+    There is none where the motion is imposed, and of a log on whose command the model runs away.
     """
     logs = {} if model.is_imposed else by_log(found)
     if model.joints:  # whose motion asks for the torques of all
         logs = {name: parts for name, parts in logs.items() if len(parts) == len(model.axes)}
 
     def run(parts: Mapping[str, PreparedLog]) -> dict[str, tuple[float, float]]:
-        own = free_run(model, parts)
-        noise = drift_of_noise(model, parts, own)
+        try:
+            own = free_run(model, parts)
+            noise = drift_of_noise(model, parts, own)
+        except CannotRun as error:
+            LOGGER.warning("no free run on %s: %s", next(iter(parts.values())).motion.name, error)
+            return {}
         return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
 
     errors: dict[str, dict[str, float]] = {a: {} for a in found}

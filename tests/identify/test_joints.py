@@ -80,6 +80,16 @@ def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder
     assert max(lacking["shoulder"].position_error.values()) > 0.02
 
 
+def test_a_model_that_runs_away_is_compared_by_its_torques_alone(folder, caplog):
+    """The fingers of some files weigh next to nothing, less than their friction's step."""
+    model = load_model(folder / "arm.toml")
+    drag = Fitted.at_start(load_catalogue()["viscous_friction"], {"c": 1e5})
+    stiff = model.axes["elbow"].with_effect(drag)
+    found = compare(model.with_axis("elbow", stiff), folder / "2.mcap").axes["elbow"]
+    assert not found.position_error and found.force_error
+    assert "2.mcap: the simulation became unstable" in caplog.text
+
+
 def test_friction_holds_an_arm_against_its_weight():
     held = {"Fc": 30.0, "Fs": 40.0, "sigma2": 0.1}  # N m; its weight takes 16 N m at the shoulder
     friction = Fitted.at_start(load_catalogue()["coulomb_viscous"], held)

@@ -141,6 +141,15 @@ def test_of_noise_an_effect_takes_next_to_nothing(effect: Effect) -> None:
     assert abs(found.part) < 0.05
 
 
+def test_a_selection_log_of_fewer_test_functions_than_blocks_has_controls() -> None:
+    found = planted(CATALOGUE["cogging"])
+    (log,) = found.judged.dataset.holdout
+    short = PreparedLog.of(log.motion.head(0.2), 0.04)
+    judged = replace(found.judged, dataset=replace(found.judged.dataset, holdout=(short,)))
+    assert len(short) < 24
+    assert np.isfinite(replace(found, judged=judged).control)
+
+
 @pytest.mark.parametrize("effect", FRICTIONS, ids=lambda e: e.name)
 def test_a_planted_friction_passes_beside_another_by_what_it_changes(effect: Effect) -> None:
     """It has no columns of its own."""
