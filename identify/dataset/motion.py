@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -41,10 +41,29 @@ OF_JOINT = 0.02  # s, over which a joint's position is a parabola that tells its
 
 @dataclass(frozen=True, eq=False)
 class OtherAxis:
-    """Another axis of the machine. signals (3, n): position, velocity, acceleration, in units."""
+    """Another axis of the machine, in the blocks of the first.
 
-    signals: Array
+    readings (n * samples + 1,): m, as the log holds them, so that each of many axes can have all
+    others. samples: of a block. sample_period: s.
+    """
+
+    readings: Array
+    samples: int
+    sample_period: float
     units: AxisUnits
+
+    @property
+    def signals(self) -> Array:
+        """Position, velocity and acceleration (3, n), in units."""
+        x = self.readings
+        position, velocity, _ = _blocks(*_midpoints(x, x, self.sample_period), self.samples)
+        return np.stack([position, velocity, rate(velocity, self.samples * self.sample_period)])
+
+    def during(self, blocks: slice) -> OtherAxis:
+        """The same of some blocks."""
+        first, end, _ = blocks.indices((len(self.readings) - 1) // self.samples)
+        part = self.readings[first * self.samples : end * self.samples + 1]
+        return replace(self, readings=part)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +153,7 @@ class Motion:
             others=np.ascontiguousarray(self.others[:, blocks]),
             raw=np.ascontiguousarray(self.raw[:, slice(*ends)]),
             bodies=None if self.bodies is None else self.bodies.during(slice(*ends)),
-            beside={a: replace(o, signals=o.signals[:, blocks]) for a, o in self.beside.items()},
+            beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
     def with_force_ahead(self, shift: float) -> Motion:
@@ -298,14 +317,17 @@ def motion_of(
     block = _block_samples(position, noise, log.period, longest_block)
     force = log.axes[axis].force
     signals = _blocks(*_midpoints(position, force, log.period), block)
-    found = {a: _other(log, a, block) for a in other_axes(log, axis, machine)}
+    found = {
+        a: OtherAxis(log.axes[a].position, block, log.period, log.axes[a].kind)
+        for a in other_axes(log, axis, machine)
+    }
     several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
     other = None if several else next(iter(found.values()), None)
     return Motion(
         name=name,
         axis=axis,
         signals=signals,
-        others=np.zeros_like(signals) if other is None else other.signals,
+        others=_none(signals.shape[1]) if other is None else other.signals,
         period=block * log.period,
         start=0.5 * block * log.period,
         sample_period=log.period,
@@ -319,6 +341,12 @@ def motion_of(
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(block * signals.shape[1])),
     )
+
+
+@lru_cache(maxsize=1)  # the axes of a log share it
+def _none(count: int) -> Array:
+    """Signals (3, count) of another axis where there is none."""
+    return np.zeros((3, count))
 
 
 def _follows(signals: AxisLog) -> bool | None:
@@ -338,14 +366,6 @@ def other_axes(log: Log, axis: str, machine: Sequence[str]) -> list[str]:
     """The other axes of the log, of the machine alone where that has two."""
     pair = len(machine) == MOST_AXES_OF_A_PAIR
     return [a for a in log.axes if a != axis and (a in machine or not pair)]
-
-
-def _other(log: Log, axis: str, block: int) -> OtherAxis:
-    """Another axis of a log in blocks of some samples."""
-    x = log.axes[axis].position
-    position, velocity, _ = _blocks(*_midpoints(x, x, log.period), block)
-    acceleration = rate(velocity, block * log.period)
-    return OtherAxis(np.stack([position, velocity, acceleration]), log.axes[axis].kind)
 
 
 def _block_samples(position: Array, noise: float, period: float, longest: float) -> int:

@@ -43,6 +43,7 @@ from twin.signals import Array
 
 LOGGER = logging.getLogger("identify")
 
+
 @dataclass(frozen=True, eq=False, repr=False)
 class AxisComparison:
     """One axis over some logs.
