@@ -6,6 +6,8 @@ The measurements belong to their authors. Each function takes the folder that ho
 * LAAS: H. Andrade, laas_anti_cogging, public repository.
 * ARTS: D. Coble et al., Dataset-Friction-Damper-with-Backlash, 2022, public repository.
 * silverbox: J. Schoukens, L. Ljung, T. Wigren; public repository biaslab/nsi-silverbox.
+* TX40: public repository thanhndv212/figaroh-examples, examples/staubli_TX40.
+* double pendulum: public repository dfki-ric-underactuated-lab/double_pendulum, design A.0.
 """
 
 from __future__ import annotations
@@ -17,11 +19,15 @@ import numpy as np
 
 from benchmarks.judgement import Logs
 from twin.importers import import_log, load_mapping
-from twin.logs import AxisLog, Log
+from twin.importers.transmission import at_joints
+from twin.logs import ROTARY_UNITS, AxisLog, Log
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 INCH, KIP = 0.0254, 4448.2216152605  # m, N
 ARTS_RATE, SILVERBOX_RATE = 1024.0, 1e7 / 2**14  # Hz
+TX40_RATE, PENDULUM_RATE = 5000.0, 300.0  # Hz
+TX40_JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
+PENDULUM_JOINTS = ("first", "second")
 Given = tuple[Logs, Logs, Logs]  # training, selection, test
 
 
@@ -93,6 +99,49 @@ def _silverbox_log(data: np.ndarray) -> Log:
     """Volts (n, 2) in and out, taken for N and m."""
     columns = {"position": data[:, 1].copy(), "force": data[:, 0].copy()}
     return Log(SILVERBOX_RATE, {"x": AxisLog(columns)})
+
+
+def tx40(folder: Path) -> Given:
+    """An arm of six joints, whose motors were recorded: 13 parts of 0.6 s, as published."""
+    position, torque = (
+        np.genfromtxt(folder / "tx40" / f"{name}_data.csv", delimiter=",", skip_header=1)
+        for name in ("pos_read", "curr")
+    )
+    ratios = dict(zip(TX40_JOINTS, (32.0, 32.0, 45.0, -48.0, 45.0, 32.0), strict=True))
+    gears = {j: {j: r} for j, r in ratios.items()} | {"joint_6": {"joint_5": 32.0, "joint_6": 32.0}}
+    position[:, 1] -= 16.0 * np.pi  # where the joints of the file begin
+    position[:, 2] += 22.5 * np.pi
+    motors = {
+        j: AxisLog({"position": position[:, i], "force": torque[:, i]}, ROTARY_UNITS)
+        for i, j in enumerate(TX40_JOINTS)
+    }
+    log, part = Log(TX40_RATE, at_joints(motors, gears)), 3000
+    training, selection, test = (
+        {f"from part {a}": log.part(a * part, b * part) for a, b in parts}
+        for parts in (
+            ((0, 2), (3, 5), (6, 8), (9, 11), (12, 13)), ((2, 3), (8, 9)), ((5, 6), (11, 12)),
+        )
+    )  # fmt: skip
+    return training, selection, test
+
+
+def double_pendulum(folder: Path) -> Given:
+    """Sampled at about 300 Hz, brought to it; parts train, choose and test as published."""
+    path = folder / "double_pendulum" / "sys_id_061157.csv"
+    time, *columns = np.genfromtxt(path, delimiter=",", skip_header=1).T
+    even = np.arange(time[0], time[-1], 1.0 / PENDULUM_RATE)
+    signals = np.reshape([np.interp(even, time, c) for c in columns], (3, 2, -1))
+    axes = {
+        name: AxisLog(dict(zip(("position", "velocity", "force"), own, strict=True)), ROTARY_UNITS)
+        for name, own in zip(PENDULUM_JOINTS, signals.swapaxes(0, 1), strict=True)
+    }
+    log, edges = (
+        Log(PENDULUM_RATE, axes),
+        [np.searchsorted(even, time[k]) for k in (12_000, 16_500)],
+    )
+    spans = {"first": (0, edges[0]), "next": (edges[0], edges[1]), "last": (edges[1], len(log))}
+    training, selection, test = ({n: log.part(*map(int, s))} for n, s in spans.items())
+    return training, selection, test
 
 
 def _halves(log: Log) -> tuple[Log, Log]:

@@ -35,6 +35,7 @@ from twin.effect import Kind
 from twin.effects import load_catalogue
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.mujoco.mechanism import joints_of
 
 TITLE = "Real machines with a term withheld from their model"
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -52,13 +53,32 @@ MEMORY = (
 class Case:
     """A real machine and a model of one axis that lacks a term.
 
-    given: folder of the data -> logs by role. expected: what is right to say of it.
+    given: folder of the data -> logs by role. expected: what is right to say of it. bodies: folder
+    of the data -> name and text of the MJCF or URDF file whose joints the axes are.
     """
 
     name: str
     given: Callable[[Path], Given]
     model: MachineModel
     expected: Expected
+    bodies: Callable[[Path], tuple[str, str]] | None = None
+
+    @property
+    def axis(self) -> str:
+        """The axis that lacks something: the last of the model."""
+        return list(self.model.axes)[-1]
+
+    def modelled(self, data: Path) -> MachineModel:
+        """The model with its bodies."""
+        if self.bodies is None:
+            return self.model
+        name, text = self.bodies(data)
+        found = joints_of(text, name, self.model.joints)
+        axes = {
+            axis: replace(own, mass=found[axis].inertia, mass_fixed=True)
+            for axis, own in self.model.axes.items()
+        }
+        return replace(self.model, axes=axes, mjcf=text, mjcf_name=name)
 
 
 def law(name: str, *fixed: str, **values: float) -> Fitted:
@@ -176,15 +196,82 @@ SILVERBOX = tuple(
         ("spring", (DAMPER,), Expected(("spring",), ("cable_slab", "gravity"))),
     )
 )  # fmt: skip
-CASES = (*EMPS, *LAAS, *ARTS, *SILVERBOX)
+
+
+def arm(rate: float, joints: Sequence[str], joint: str, *laws: Fitted) -> MachineModel:
+    """A mechanism of joints without effects, but for one of them; rate: Hz."""
+    plain = {name: AxisModel(1.0, rotary=True, joint=name) for name in joints if name != joint}
+    return MachineModel("arm", plain, rate).with_axis(
+        joint, AxisModel(1.0, effects=laws, rotary=True, joint=joint)
+    )
+
+
+# TX40: Coulomb and viscous friction and a rotor on each joint; the motor of joint 6 turns with
+# joint 5 as well, and its friction acts on both; the friction of joint 3 follows its load.
+RUBS, ROTOR = law("coulomb_viscous", Fc=3.0, Fs=3.0, sigma2=1.0), law("rotor_inertia", inertia=0.05)
+TX40_KNOWN = ("constant_force", "gravity", "spring", "cogging", "force_constant_ripple")
+TX40 = tuple(
+    Case(
+        f"TX40: {term}", real_machines.tx40,
+        arm(real_machines.TX40_RATE, real_machines.TX40_JOINTS, joint, *laws),
+        Expected((right,), known=(*also, *TX40_KNOWN), known_shapes=("coulomb_viscous",)),
+        lambda data: ("tx40.urdf", (data / "tx40" / "tx40.urdf").read_text(encoding="utf-8")),
+    )
+    for term, joint, laws, right, also in (
+        ("armature, joint 1", "joint_1", (RUBS,), "rotor_inertia", ("quadratic_drag",)),
+        ("armature, joint 3", "joint_3", (RUBS,), "rotor_inertia", ("joint_load_friction",)),
+        ("armature, joint 4", "joint_4", (RUBS,), "rotor_inertia", ()),
+        ("wrist, joint 5", "joint_5", (RUBS, ROTOR), "transmission_coupling", ()),
+        ("wrist, joint 6", "joint_6", (RUBS, ROTOR), "transmission_coupling", ()),
+        ("load, joint 3", "joint_3", (RUBS, ROTOR), "joint_load_friction", ()),
+    )
+)  # fmt: skip
+
+
+def pendulum(lever: float) -> tuple[str, str]:
+    """The double pendulum as its laboratory identified it; lever: m, of link 2's centre."""
+    turning, at = 0.02392, max(lever, 1e-3)  # kg m^2 about joint 2; m
+    links = ((0.5594, 0.3, 0.05347 - 0.5594 * 0.3**2), (0.6043, at, turning - 0.6043 * lever**2))
+    first, second = (
+        f'<joint name="{name}" axis="0 -1 0"/><inertial pos="0 0 {-centre:g}" mass="{mass:g}" '
+        f'diaginertia="{own:g} {own:g} {own:g}"/>'
+        for name, (mass, centre, own) in zip(real_machines.PENDULUM_JOINTS, links, strict=True)
+    )
+    return "pendulum.xml", (
+        f'<mujoco><worldbody><body name="link1">{first}<body name="link2" pos="0 0 -0.3">{second}'
+        "</body></body></worldbody></mujoco>"
+    )
+
+
+# Double pendulum: friction that follows the load; torques or masses are off by some 5 %, so that a
+# weight is left on each joint.
+PENDULUM_KNOWN = ("joint_load_friction", "gravity", "spring")
+PENDULUM = tuple(
+    Case(
+        f"double pendulum: {term}", real_machines.double_pendulum,
+        arm(real_machines.PENDULUM_RATE, real_machines.PENDULUM_JOINTS, "second", *laws), expected,
+        lambda _, lever=lever: pendulum(lever),  # type: ignore[misc]
+    )
+    for term, lever, laws, expected in (
+        (
+            "Coulomb, joint 2", 0.1838, (law("viscous_friction", c=0.1),),
+            Expected(FRICTIONS, known=PENDULUM_KNOWN, known_shapes=FRICTIONS),
+        ),
+        (
+            "gravity of link 2", 0.0, (law("coulomb_viscous", Fc=0.1, Fs=0.1, sigma2=0.05),),
+            Expected(("gravity", "link_mass"), known=PENDULUM_KNOWN, known_shapes=FRICTIONS),
+        ),
+    )
+)  # fmt: skip
+CASES = (*EMPS, *LAAS, *ARTS, *SILVERBOX, *TX40, *PENDULUM)
 
 
 def run(case: Case, data: Path) -> Row:
     """The diagnosis of one machine on one thread, judged."""
     begun = process_time()
-    ((axis, _),) = case.model.axes.items()
-    dataset, base = fitted(case.model, axis, *case.given(data))
-    found = diagnose_axis(base, dataset, usable(CATALOGUE, case.model))
+    model = case.modelled(data)
+    dataset, base = fitted(model, case.axis, *case.given(data))
+    found = diagnose_axis(base, dataset, usable(CATALOGUE, model))
     return row_of(case.name, case.expected, found, process_time() - begun)
 
 
