@@ -98,10 +98,9 @@ def test_without_the_measurements_nothing_is_judged(
 
 def test_each_real_machine_is_read_with_its_axis_and_its_motion(shared_data: Path) -> None:
     for given in {c.given: c for c in CASES}.values():
-        ((axis, _),) = given.model.axes.items()
         roles = given.given(shared_data)
         for log in (log for logs in roles for log in logs.values()):
-            signals = log.axes[axis]
+            signals = log.axes[given.axis]
             assert np.isfinite(signals.position).all()
             assert np.std(signals.force) > 0.0
             assert log.sample_rate == pytest.approx(given.model.sample_rate)
