@@ -27,7 +27,7 @@ from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
-from twin.effect import Effect
+from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
@@ -142,6 +142,9 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         alone = replace(fit.axis, effects=(fitted,))
         if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
             return "the motion repeats with it, so that any force of the motion could be it"
+        own_force = effect.kind is Kind.FORCE and not effect.of_joints
+        if own_force and _is_of_the_file(alone, dataset):
+            return "a tenth more or less of what the bodies of the file weigh could be it"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
     if not any(m <= MOST_INERTIA * fit.axis.mass for m in masses):
         return "it takes the place of the inertia"
@@ -155,6 +158,24 @@ def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
     columns = np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)])
     left = unabsorbed(force, orthonormal(columns))
     return float(left @ left) < SAME_FORCE * float(force @ force)
+
+
+def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -> bool:
+    """Whether most of a joint's force is what its bodies take, times less than their accuracy.
+
+    Masses and centres of a file, and the torque constants of motors, are seldom better than a
+    tenth: two models of one machine by its own makers differ by as much.
+    """
+    if any(log.motion.bodies is None for log in dataset.fit):
+        return False
+    force = averaged_force(alone, dataset.fit)
+    rows = (log.test_function.mean(log.motion.joint_signals) for log in dataset.fit)
+    _, _, _, load, *_ = np.hstack([*rows])
+    if not load.any():
+        return False
+    part = float(load @ force) / float(load @ load)
+    left = force - part * load
+    return abs(part) < accuracy and float(left @ left) < SAME_FORCE * float(force @ force)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:

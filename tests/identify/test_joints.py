@@ -9,6 +9,7 @@ from cli_runs import refusal, twin
 
 from identify.analysis.joint_signs import misassigned
 from identify.estimation.open_loop import open_loop
+from identify.selection.trying import try_effect
 from identify.workflow import compare, diagnose, fit
 from twin.effects import load_catalogue
 from twin.logs import read_log, write_log
@@ -146,6 +147,25 @@ def test_a_hidden_effect_is_named_on_its_joint_and_nowhere_else(folder, effect):
         (effect,) if j == joint else () for j in JOINTS
     ]
     assert found.axes[joint].tested.after < 0.1 * found.axes[joint].tested.before
+
+
+def heavier(model):
+    """Than its file by a twentieth: no effect, but a file that is not exact."""
+    model.body_mass[:] *= 1.05
+
+
+@pytest.mark.parametrize(
+    ("planted", "refused"),
+    [
+        ({"change": heavier}, "a tenth more or less of what the bodies of the file weigh"),
+        ({"forces": lambda q, v: friction(q, v) - [0.0, 3.0 * np.sin(q[1]), 0.0]}, None),
+    ],
+)
+def test_what_masses_that_are_off_could_make_is_no_effect_of_a_joint(folder, planted, refused):
+    made = fit(load_model(folder / "arm.toml"), {"1": arm_log(1, **planted)})
+    spring = load_catalogue()["spring"]
+    found = try_effect(made.fits["shoulder"], made.datasets["shoulder"], spring)
+    assert found.doubt is None if refused is None else refused in found.doubt
 
 
 @pytest.mark.parametrize(
