@@ -139,11 +139,14 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
     bend = np.clip(bend, -OUTLIER * usual, OUTLIER * usual)
     if not bend.any() or not (span := float(np.ptp(place))):
         return ()
-    finest = min(FINEST_CYCLES / span, 0.5 / step if step else np.inf)
+    # Of more cycles than a few times the samples, some fit by chance.
+    cycles = min(FINEST_CYCLES, 16 * len(bend))
+    finest = min(cycles / span, 0.5 / step if step else np.inf)
     found: list[float] = []
     for _ in range(MOST_LINES):
         frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest)
-        if share < LEAST:
+        chance = np.log(cycles) + 0.5 * len(bend) * np.log1p(-min(share, 0.5))
+        if share < LEAST or chance > np.log(RULE.line_chance):
             break
         bends = np.diff(_waves(readings, 1.0 / frequency), 4, axis=0)
         gains = _gains(bends, bend)

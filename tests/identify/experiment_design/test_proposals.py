@@ -94,7 +94,7 @@ def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     """The lengths of a linear stage, taken for rad, were lost in the noise of a rotary axis."""
     hardware = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5, encoder_noise=noise)
     turned = AxisModel(5e-6, hardware, rotary=True)
-    found, not_run = proposals(MachineModel("r", {"a": turned}, 2000.0), "a", 20.0)
+    found, not_run = proposals(MachineModel("r", {"a": turned}, 400.0), "a", 20.0)
     assert not not_run
     short = [e.span for e in found if isinstance(e, Passes)][-4:]
     np.testing.assert_allclose(short, scale * np.array([2e-5, 2e-4, 2e-3, 0.02]), rtol=0.01)
@@ -103,7 +103,9 @@ def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     assert (rests.span, rests.speed) == pytest.approx((2e-3 * scale, 4e-3 * scale), rel=0.01)
     (stairs,) = (e for e in found if isinstance(e, Staircase))
     assert stairs.speeds[0] == pytest.approx(5e-4 * scale, rel=0.01)
-    slow = MachineModel("r", {"a": replace(turned, hardware=replace(hardware, velocity=1e-3))}, 2e3)
+    slow = MachineModel(
+        "r", {"a": replace(turned, hardware=replace(hardware, velocity=1e-3))}, 400.0
+    )
     found, not_run = proposals(slow, "a", 20.0)
     every = [*found, *(n.experiment for n in not_run)]
     (stairs,) = (e for e in every if isinstance(e, Staircase))
