@@ -1,15 +1,17 @@
-"""Joints of a log that are not those of the MuJoCo file: of another direction, or exchanged.
+"""Joints of a log that are not those of the MuJoCo file: of another sign or unit, or exchanged.
 
 The bodies of a mechanism take other torques of all joints where one of them goes the wrong way. So
-each joint is tried the other way round, its position alone or its torque with it, and each two are
-exchanged; what the simplest friction leaves of the torques of all joints tells which is right.
+each joint is tried the other way round, its position alone or its torque with it, and in degrees,
+and each two are exchanged; what the simplest friction leaves of the torques of all joints tells
+which is right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
+from math import pi
 
 import numpy as np
 
@@ -18,51 +20,84 @@ from identify.dataset.motion import bodies_along, motion_of
 from twin.checks import moves
 from twin.logs import Log
 from twin.model.machine import MachineModel
+from twin.signals import Array
 
-MOTION = ("position", "velocity", "setpoint_position", "setpoint_velocity", "setpoint_acceleration")
-REVERSED = {"position": MOTION, "position and torque": (*MOTION, "force", "current")}
+SIGNALS = ("position", "force", "current")  # a velocity has a unit and a sign of its own
 LEAST_FALL = 0.5  # of the squared torque that is left, from which another assignment is believed
 
 
-def misassigned(model: MachineModel, log: Log) -> str | None:
-    """What of a log seems to be of another direction or joint, in a sentence; None where nothing.
+def misassigned(
+    model: MachineModel, log: Log, duration: float = 240.0, least: float = 0.01, most: int = 8
+) -> str | None:
+    """What of a log seems to be of another sign, unit or joint, in a sentence; None if nothing.
 
-    model: its axes are joints of a mechanism.
+    model: its axes are joints of a mechanism. duration: s, of all joints
+    together, of the log's beginning that tells it.
+    Where no joint leaves ``least`` of its squared torque, all is right. Tried are the ``most``
+    joints that leave most of it, as each asks for the torques of all joints anew.
     """
-    given = _left(model, log)
-    best = min(((_left(model, other), said) for said, other in _others(model, log)), default=None)
-    if best is None or best[0] >= LEAST_FALL * given:
+    head = _plain(log.part(0, min(round(duration / len(model.joints) / log.period), len(log))))
+    going = [axis for axis in model.joints if moves(head, axis)]
+    parts = _left(model, head, going)
+    if max(parts, default=0.0) < least:
         return None
-    part = 100.0 * (best[0] / given) ** 0.5
+    worst = sorted(zip(parts, going, strict=True), reverse=True)[:most]
+    suspects = [axis for axis in going if axis in {a for _, a in worst}]
+    tried = ((float(_left(model, o, going).sum()), s) for o, s in _others(model, head, suspects))
+    best, given = min(tried), float(parts.sum())
+    if best[0] >= LEAST_FALL * given:
+        return None
+    left = 100.0 * (best[0] / given) ** 0.5
     return (
-        f"{best[1]} they would leave {part:.0f} % of the torque that the bodies and friction leave "
+        f"{best[1]} they would leave {left:.0f} % of the torque that the bodies and friction leave "
         "now; correct the import map, or the file"
     )
 
 
-def _others(model: MachineModel, log: Log) -> Iterator[tuple[str, Log]]:
-    going = [axis for axis in model.joints if moves(log, axis)]
-    for axis in going:
-        for what, fields in REVERSED.items():
-            said = f"axis {axis}: with the other sign of its {what} (sign = -1 in the map)"
-            yield said, _reversed(log, axis, fields)
-    for one, other in combinations(going, 2):
+def _others(model: MachineModel, log: Log, suspects: Sequence[str]) -> Iterator[tuple[Log, str]]:
+    for axis in suspects:
+        sign = "(sign = -1 in the map)"
+        said = f"axis {axis}: with the other sign of its position"
+        yield _scaled(log, [axis], -1.0), f"{said} {sign}"
+        yield _scaled(log, [axis], -1.0, SIGNALS), f"{said} and torque {sign}"
+    turning = [axis for axis in model.joints if model.axes[axis].rotary]
+    for axes in (turning, *([axis] for axis in suspects if axis in turning)):
+        named = f"ax{'es' if axes[1:] else 'is'} {', '.join(axes)}"
+        for unit, factor in (("deg", pi / 180.0), ("rad", 180.0 / pi)):
+            said = f'{named}: with positions in {unit} (unit = "{unit}" in the map)'
+            yield _scaled(log, axes, factor), said
+    for one, other in combinations(suspects, 2):
         if model.axes[one].units == model.axes[other].units:
             swapped = {**log.axes, one: log.axes[other], other: log.axes[one]}
-            yield f"axes {one} and {other}: exchanged", replace(log, axes=swapped)
+            yield replace(log, axes=swapped), f"axes {one} and {other}: exchanged"
 
 
-def _reversed(log: Log, axis: str, fields: Sequence[str]) -> Log:
-    own = log.axes[axis]
-    columns = {n: -c if n in fields else c for n, c in own.columns.items()}
-    return replace(log, axes={**log.axes, axis: replace(own, columns=columns)})
+def _plain(log: Log) -> Log:
+    """The log with positions and torques alone."""
+    axes = {
+        name: replace(own, columns={n: own.columns[n] for n in SIGNALS if n in own.columns})
+        for name, own in log.axes.items()
+    }
+    return replace(log, axes=axes)
 
 
-def _left(model: MachineModel, log: Log) -> float:
-    """What is left of the squared torques of all moving joints, as parts of each, together."""
+def _scaled(
+    log: Log, axes: Collection[str], factor: float, fields: Collection[str] = ("position",)
+) -> Log:
+    """The log with some signals of some axes times a factor."""
+    scaled = {}
+    for axis in axes:
+        own = log.axes[axis]
+        columns = {n: factor * c if n in fields else c for n, c in own.columns.items()}
+        scaled[axis] = replace(own, columns=columns)
+    return replace(log, axes={**log.axes, **scaled})
+
+
+def _left(model: MachineModel, log: Log, going: Sequence[str]) -> Array:
+    """What is left of the squared torque of each moving joint, as a part of it."""
     bodies, parts = bodies_along(model, log, ""), []
-    for axis in filter(lambda name: moves(log, name), model.joints):
+    for axis in going:
         motion = motion_of(log, axis, "", ripples=(), bodies=bodies[axis])
         power = float(np.mean(motion.command**2)) or 1.0
         parts.append(friction_left([motion], LENGTHS[0]) ** 2 / power)
-    return float(np.sum(parts))
+    return np.array(parts)

@@ -58,6 +58,9 @@ def test_planted_friction_is_found(folder):
             "axis shoulder: with the other sign of its position (sign",
         ),
         (lambda p, f: (p[:, [0, 2, 1]], f[:, [0, 2, 1]]), "axes shoulder and elbow: exchanged"),
+        (lambda p, f: (np.degrees(p), f), "axes base, shoulder, elbow: with positions in deg"),
+        (lambda p, f: (p * [1, np.degrees(1), 1], f), "axis shoulder: with positions in deg"),
+        (lambda p, f: (np.radians(p), f), "axes base, shoulder, elbow: with positions in rad"),
     ],
 )
 def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
