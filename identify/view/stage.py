@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from identify.view.replay import Replay
+from twin.errors import InputError
 from twin.mujoco.mjcf import machine_spec
 from twin.signals import Array
 
@@ -87,6 +88,11 @@ def _spec(replay: Replay) -> mujoco.MjSpec:
     bare = {name: replace(axis, effects=()) for name, axis in machine.axes.items()}
     # Where a motion is imposed there is no mass, but a body has one.
     bare = {name: replace(a, mass=a.mass or 1.0) for name, a in bare.items()}
+    if machine.joints:
+        raise InputError(
+            f"{machine.name}: its axes are joints of {machine.mjcf_name}, which is not shown with "
+            "motions beside each other; see that file in MuJoCo's own viewer, and `twin compare`"
+        )
     spec = machine_spec(replace(machine, axes=bare))
     if not machine.mjcf:
         _dress(spec, replay)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -51,6 +53,17 @@ def test_it_moves_as_the_machine_in_bare_mujoco():
     assert isinstance(made, str)
     np.testing.assert_allclose(pushed(made, False), pushed(ARM, True), atol=5e-3)
     assert np.abs(pushed(made, False) - pushed(ARM, False)).max() > 0.1
+
+
+def test_a_joint_may_have_the_name_of_an_attribute():
+    named = ARM.replace('"elbow"', '"joint1"')
+    whole = model(named)
+    axes = {a.replace("elbow", "joint1"): own for a, own in whole.axes.items()}
+    axes["joint1"] = replace(axes["joint1"], joint="joint1")
+    made = export(replace(whole, axes=axes), {}).files["arm.xml"]
+    assert isinstance(made, str)
+    last = mujoco.MjModel.from_xml_string(made).joint("joint1").dofadr[0]
+    assert mujoco.MjModel.from_xml_string(made).dof_frictionloss[last] == pytest.approx(COULOMB[2])
 
 
 def test_comments_and_order_stay_and_what_was_there_of_friction_goes():

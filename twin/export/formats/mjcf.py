@@ -91,7 +91,9 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     def changed(found: re.Match[str]) -> str:
         tag = found[0]
         named = re.search(r"\sname\s*=\s*[\"']([^\"']*)[\"']", tag)
-        if tag.startswith("<!--") or named is None or named[1] != joint or "joint1" in tag:
+        if tag.startswith("<!--") or named is None or named[1] != joint:
+            return tag
+        if re.search(r"\sjoint1\s*=", tag):  # an equality constraint of that name
             return tag
         for key, value in new.items():
             own_text, pattern = f'{key}="{value:.9g}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
