@@ -66,7 +66,8 @@ def _of_one(path: Path, mapping: ImportMap) -> Log:
 
 
 def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
-    files, rate = mapping.files or [], mapping.resample
+    files = mapping.files or []
+    rate = mapping.resample or next(iter(f.sample_rate for f in files), None)  # that of all
     if len(paths) != len(files):
         raise InputError(
             f"{len(paths)} files are given, the map has {len(files)} [[files]] tables; "

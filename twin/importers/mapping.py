@@ -271,7 +271,8 @@ class ImportMap(_File):
             raise InputError(
                 "time and sample_rate are those of each file; give them under [[files]]"
             )
-        if self.resample is None:
+        rates = {file.sample_rate for file in files}
+        if self.resample is None and (rates == {None} or len(rates) > 1):
             raise InputError(
                 "several files have several clocks; give resample (Hz), their common one"
             )
