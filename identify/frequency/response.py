@@ -15,7 +15,7 @@ noise alone, and the rest of the variance is what is not linear.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +104,10 @@ def response(records: Sequence[Record], count: int = 200, width: float = 0.03) -
         )
     grid = np.geomspace(lowest, 0.45 / period, count)
     grid = np.unique(np.rint(grid * longest)) / longest
-    found = [[s.about(f, width) for f in grid] for s in spectra]
-    return _together(grid, found, period)
+    found = _together(grid, [[s.about(f, width) for f in grid] for s in spectra], period)
+    if all(record.setpoint is not None for record in records):
+        return found
+    return replace(found, closed=np.full(len(grid), np.nan, dtype=complex))
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,7 @@ def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> 
 
 
 def _ratio(one: _Local) -> tuple[complex, float, float]:
-    """Position over force, its variance, and that of noise (Pintelon, Schoukens, eq. 2-50)."""
+    """Position over force, its variance, and that of noise."""
     force, position = one.mean
     plant = position / force if force else complex(np.nan)
 

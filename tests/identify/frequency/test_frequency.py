@@ -107,6 +107,7 @@ def test_what_cannot_be_told_is_refused_in_one_line() -> None:
     still = replace(record, position=1e-7 * np.random.default_rng(0).standard_normal(SAMPLES))
     with pytest.raises(InputError, match="too few for a mass"):
         plant_of(response([still]))
+    assert loop_of(response([replace(record, setpoint=None)]), None) is None
 
 
 # A joint behind an elastic gear: a rigid fit makes a mass or a delay of it
