@@ -77,7 +77,7 @@ def plant_of(found: Response, most: int = 4) -> Plant:
             "too few for a mass; excite the axis more: `twin simulate multisine`"
         )
     told = replace(told, spread=np.hypot(told.spread, NEAREST * np.abs(told.plant)))
-    best = _solved(told, _rigid(told))
+    best = min((_solved(told, start) for start in _without_modes(told)), key=lambda s: s.cost)
     for _ in range(most):
         better = min(
             (_solved(told, start) for start in _with_mode(told, best)), key=lambda s: s.cost
@@ -98,7 +98,7 @@ def _is_seen(mode: Mode, told: Response) -> bool:
     """
     low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
     first, last = told.frequency[[0, -1]] / mode.frequency.value
-    peaks = mode.damping.value < 0.99 * DAMPING[-1]
+    peaks = mode.damping.band < mode.damping.value < 0.99 * DAMPING[-1]
     return bool(peaks and abs(mode.gain.value) > mode.gain.band and first < low and high < last)
 
 
@@ -130,14 +130,26 @@ def _solved(told: Response, start: Array) -> _Solved:
     )  # fmt: skip
     square = done.jac.T @ done.jac
     spread = max(2.0 * done.cost / max(len(done.fun) - len(start), 1), 1.0)
-    return _Solved(done.x, 2.0 * done.cost, spread * np.linalg.pinv(square))
+    covariance = spread * np.linalg.pinv(square)
+    # What ends at a bound is not told, nor what may change by a factor e and leaves all as it is.
+    untold = (done.active_mask != 0) | (square.diagonal() < 1.0)
+    covariance[np.diag(untold)] = np.inf
+    return _Solved(done.x, 2.0 * done.cost, covariance)
 
 
-def _rigid(told: Response) -> Array:
-    """Logarithms of mass, damping, stiffness over mass, and the delay in samples, to begin with."""
+def _without_modes(told: Response) -> tuple[Array, Array]:
+    """Logarithms of mass, damping and stiffness over mass, delay in samples, to begin with.
+
+    Of a free mass, and of one on a spring.
+    """
     omega = 2.0 * np.pi * told.frequency
-    mass = float(np.median(1.0 / (omega**2 * np.abs(told.plant))))
-    return np.array([np.log(mass), np.log(0.1 * omega[0]), np.log(0.1 * omega[0] ** 2), 0.1])
+    masses = 1.0 / (omega**2 * np.abs(told.plant))
+    free, sprung = (float(np.median(m)) for m in (masses, masses[-len(masses) // 3 :]))
+    stiffness = 1.0 / float(np.median(np.abs(told.plant[: len(masses) // 6])))
+    return (
+        np.array([np.log(free), np.log(0.1 * omega[0]), np.log(0.1 * omega[0] ** 2), 0.1]),
+        np.array([np.log(sprung), np.log(omega[0]), np.log(stiffness / sprung), 0.1]),
+    )
 
 
 def _with_mode(told: Response, best: _Solved) -> list[Array]:
@@ -209,7 +221,7 @@ def _read(found: Response, told: Response, best: _Solved) -> Plant:
 
     def logarithm(i: int, times: float = 1.0) -> Told:
         value = times * float(np.exp(values[i]))
-        return Told(value, value * float(np.expm1(min(bands[i], 50.0))))
+        return Told(value, value * float(np.expm1(bands[i])) if bands[i] < 50.0 else np.inf)
 
     modes = tuple(
         Mode(
