@@ -371,9 +371,7 @@ def frequency_response(
     """
     given = logs_by_name(logs)
     machine = None if model is None else as_model(model, catalogue)
-    found = responses_of(given, machine, progress)
-    title = "the machine" if machine is None else machine.name
-    return FrequencyResponse(title, tuple(given), found)
+    return FrequencyResponse(tuple(given), responses_of(given, machine, progress))
 
 
 def add_named(found: Diagnosis) -> Addition | None:

@@ -17,8 +17,6 @@ class Loop:
     Margins are no number where the loop does not cross within the frequencies that are told.
     """
 
-    frequency: Array
-    """(k,) Hz."""
     sensitivity: Complex
     """(k,) What is left of a disturbance of the position."""
     crossover: float
@@ -60,8 +58,8 @@ def loop_of(found: Response, controller: Complex | None) -> Loop | None:
     if controller is None and peak <= 1.0:
         return None
     return Loop(
-        found.frequency, np.where(told, sensitivity, np.nan), crossover,
-        float(np.angle(-np.exp(1j * turn))), gain, peak, controller is not None,
+        np.where(told, sensitivity, np.nan), crossover, float(np.angle(-np.exp(1j * turn))), gain,
+        peak, controller is not None,
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ NEAREST = 0.01  # of a response: the error that a polynomial over a resonance ma
 
 
 @dataclass(frozen=True)
-class Told:
+class Banded:
     """A value and half its 90 % band, both in its unit."""
 
     value: float
@@ -40,9 +40,9 @@ class Told:
 class Mode:
     """A resonance: its frequency Hz, damping ratio, and part of the response beside the mass's."""
 
-    frequency: Told
-    damping: Told
-    gain: Told
+    frequency: Banded
+    damping: Banded
+    gain: Banded
     """c m (1): where positive, encoder and motor are on one side of the spring."""
 
 
@@ -50,13 +50,13 @@ class Mode:
 class Plant:
     """What a response shows; on a rotary axis inertia (kg m^2) and so on."""
 
-    mass: Told
+    mass: Banded
     """kg"""
-    damping: Told
+    damping: Banded
     """N s/m"""
-    stiffness: Told
+    stiffness: Banded
     """N/m: of a presliding friction, where the motion does not break away."""
-    delay: Told
+    delay: Banded
     """s, from the beginning of the sample whose command acts."""
     modes: tuple[Mode, ...]
     fitted: Complex
@@ -85,7 +85,7 @@ def plant_of(found: Response, most: int = 4) -> Plant:
         # Twice the fall of the cost is that of a log likelihood; three values more.
         if best.cost - better.cost < 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic:
             break
-        if not all(_is_seen(mode, told) for mode in _read(found, told, better).modes):
+        if not all(_is_seen(mode, told) for mode in better.modes):
             break
         best = better
     return _read(found, told, best)
@@ -109,6 +109,28 @@ class _Solved:
     values: Array
     cost: float
     covariance: Array
+
+    @property
+    def bands(self) -> Array:
+        """Half the 90 % bands (n,) of the values."""
+        return np.asarray(SURE * np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def banded(self, i: int, times: float = 1.0) -> Banded:
+        """What the value at i is the logarithm of, times a number."""
+        value, band = times * float(np.exp(self.values[i])), self.bands[i]
+        return Banded(value, value * float(np.expm1(band)) if band < 50.0 else np.inf)
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes, the slowest first."""
+        modes = (
+            Mode(
+                self.banded(i, 0.5 / np.pi), self.banded(i + 1),
+                Banded(float(self.values[i + 2]), float(self.bands[i + 2])),
+            )
+            for i in range(4, len(self.values), 3)
+        )  # fmt: skip
+        return tuple(sorted(modes, key=lambda m: m.frequency.value))
 
 
 def _solved(told: Response, start: Array) -> _Solved:
@@ -155,16 +177,15 @@ def _without_modes(told: Response) -> tuple[Array, Array]:
 def _with_mode(told: Response, best: _Solved) -> list[Array]:
     """Values with one mode more, where a linear step finds that one takes most."""
     left = (told.plant - _sampled(best.values, told)) / told.spread
+    mass, late = float(np.exp(best.values[0])), best.values[3] * told.period
     tried = []
     for omega in 2.0 * np.pi * told.frequency[2:-2]:
         for damping in DAMPING[1:-1]:
-            alone = _sampled(
-                np.array([*best.values[:4], np.log(omega), np.log(damping), 1.0]), told
-            )
-            shape = (alone - _sampled(best.values[:4], told)) / told.spread
-            gain = float(np.real(np.vdot(shape, left)) / np.real(np.vdot(shape, shape)))
-            fall = gain * float(np.real(np.vdot(shape, left)))
-            tried.append((fall, omega, damping, gain))
+            roots = _roots(2.0 * damping * omega, omega**2)
+            shape = _held(roots, 1.0 / mass, late, told) / told.spread
+            met = float(np.real(np.vdot(shape, left)))
+            gain = met / float(np.real(np.vdot(shape, shape)))
+            tried.append((gain * met, omega, damping, gain))
     tried.sort(reverse=True)
     apart: list[tuple[float, float, float, float]] = []
     for one in tried:
@@ -216,28 +237,14 @@ def _grown(pole: complex, time: float) -> complex:
 
 
 def _read(found: Response, told: Response, best: _Solved) -> Plant:
-    values, bands = best.values, SURE * np.sqrt(np.maximum(np.diag(best.covariance), 0.0))
-    mass = float(np.exp(values[0]))
-
-    def logarithm(i: int, times: float = 1.0) -> Told:
-        value = times * float(np.exp(values[i]))
-        return Told(value, value * float(np.expm1(bands[i])) if bands[i] < 50.0 else np.inf)
-
-    modes = tuple(
-        Mode(
-            logarithm(i, 0.5 / np.pi),
-            logarithm(i + 1),
-            Told(float(values[i + 2]), float(bands[i + 2])),
-        )
-        for i in range(4, len(values), 3)
-    )
+    values, mass = best.values, float(np.exp(best.values[0]))
     left = np.abs(_sampled(values, told) - told.plant) / told.spread
     return Plant(
-        mass=logarithm(0),
-        damping=logarithm(1, mass),
-        stiffness=logarithm(2, mass),
-        delay=Told(float(values[3]) * told.period, float(bands[3]) * told.period),
-        modes=tuple(sorted(modes, key=lambda m: m.frequency.value)),
+        mass=best.banded(0),
+        damping=best.banded(1, mass),
+        stiffness=best.banded(2, mass),
+        delay=Banded(float(values[3]) * told.period, float(best.bands[3]) * told.period),
+        modes=best.modes,
         fitted=_sampled(values, found),
         misfit=float(np.sqrt(np.mean(left**2))),
     )

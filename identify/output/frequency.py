@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
-from identify.frequency.plant import Plant, Told
+from identify.frequency.plant import Banded, Plant
 from identify.output.numbers import Scale, listed, number, percent, pretty
 from identify.results import figure_of, text_of
 from identify.results.frequency import FrequencyResponse
@@ -54,28 +54,26 @@ def _shown(title: str, shown: Shown, units: AxisUnits) -> list[str]:
 
 
 def _plant(plant: Plant, period: float, units: AxisUnits) -> list[str]:
-    lines = [f"{units.mass_name}: {_told(plant.mass, units.mass)}"]
+    lines = [f"{units.mass_name}: {_with_band(plant.mass, units.mass)}"]
     if plant.damping.band < plant.damping.value:
-        lines.append(f"viscous damping: {_told(plant.damping, units('N s/m'))}")
+        lines.append(f"viscous damping: {_with_band(plant.damping, units('N s/m'))}")
     if plant.stiffness.band < plant.stiffness.value:
-        lines.append(f"stiffness: {_told(plant.stiffness, units('N/m'))}")
+        lines.append(f"stiffness: {_with_band(plant.stiffness, units('N/m'))}")
     samples = f"{plant.delay.value / period:.2f} samples"
-    lines.append(f"delay: {_told(plant.delay, 's')}, {samples}")
+    lines.append(f"delay: {_with_band(plant.delay, 's')}, {samples}")
     for mode in plant.modes:
+        frequency, ratio = _with_band(mode.frequency, "Hz"), _with_band(mode.damping, "1")
         side = "motor and encoder on one side" if mode.gain.value > 0.0 else "beyond the spring"
-        lines.append(
-            f"resonance: {_told(mode.frequency, 'Hz')}, damping ratio {_told(mode.damping, '1')}, "
-            f"{side}"
-        )
-    return lines or ["no mass"]
+        lines.append(f"resonance: {frequency}, damping ratio {ratio}, {side}")
+    return lines
 
 
 def _loop(shown: Shown) -> list[str]:
     loop = shown.loop
     if loop is None:
         return ["loop: not told, as the setpoint is fed forward, or there is none"]
-    by = "of the model's controller" if loop.by_controller else "by the setpoint, if nothing is fed"
-    by = by if loop.by_controller else f"{by} forward"
+    by = "by the setpoint, if nothing is fed forward"
+    by = "of the model's controller" if loop.by_controller else by
     crossing = "no crossover in the band"
     if math.isfinite(loop.crossover):
         crossing = (
@@ -87,11 +85,11 @@ def _loop(shown: Shown) -> list[str]:
     return [f"loop {by}: {crossing}{gain}, {peak}"]
 
 
-def _told(told: Told, unit: str) -> str:
+def _with_band(one: Banded, unit: str) -> str:
     """A value with its 90 % band, e.g. "15.00 ± 0.02 kg"."""
-    scale = Scale.of(unit, [told.value, told.band])
-    low, high = told.value - told.band, told.value + told.band
-    value, band = scale.within(low, high, told.value, told.band)
+    scale = Scale.of(unit, [one.value, one.band])
+    low, high = one.value - one.band, one.value + one.band
+    value, band = scale.within(low, high, one.value, one.band)
     return f"{value} ± {band} {scale.unit}".rstrip()
 
 

@@ -26,7 +26,6 @@ COLUMNS = {
 class FrequencyResponse(Printed):
     """The frequency responses of a machine's axes, of force to position."""
 
-    machine: str
     logs: tuple[str, ...]
     axes: Mapping[str, AxisFrequency]
 

@@ -9,7 +9,7 @@ from identify.output.answers.answer import Answer, Entry, Number, answer_of
 from identify.results.frequency import FrequencyResponse
 
 
-class ToldEntry(Entry):
+class BandedEntry(Entry):
     """A value and half its 90 % band."""
 
     value: Number
@@ -19,19 +19,19 @@ class ToldEntry(Entry):
 class ModeEntry(Entry):
     """A resonance: Hz, damping ratio, and its part of the response beside the mass's."""
 
-    frequency: ToldEntry
-    damping: ToldEntry
-    gain: ToldEntry
+    frequency: BandedEntry
+    damping: BandedEntry
+    gain: BandedEntry
 
 
 class PlantEntry(Entry):
     """What a response shows, in SI units; delay in s."""
 
-    mass: ToldEntry
+    mass: BandedEntry
     mass_unit: str
-    damping: ToldEntry
-    stiffness: ToldEntry
-    delay: ToldEntry
+    damping: BandedEntry
+    stiffness: BandedEntry
+    delay: BandedEntry
     modes: list[ModeEntry]
     misfit: Number
 

@@ -15,7 +15,7 @@ from scipy.signal import butter, lfilter
 import identify
 from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
 from identify.frequency.loop import loop_of
-from identify.frequency.plant import Told, plant_of
+from identify.frequency.plant import Banded, plant_of
 from identify.frequency.response import Record, response
 from identify.output.answers.answer import answer_of
 from tests.cli_runs import twin
@@ -212,4 +212,4 @@ def test_a_response_is_python_controls_frd() -> None:
     frd = found.to_frd("x")
     assert isinstance(frd, control.FRD)
     assert answer_of(found)
-    assert isinstance(found.axes["x"].measured.plant.mass, Told)
+    assert isinstance(found.axes["x"].measured.plant.mass, Banded)
