@@ -273,8 +273,10 @@ def frf(
     Example: twin frf multisine.mcap fitted.toml --plot bode.png
     """
     from identify import workflow
-    from identify.output.frequency import write_bode
+    from identify.output.pictures import require_picture, save_picture
 
+    if plot:
+        require_picture(plot)
     paths = [Path(name) for name in logs if not name.endswith(".toml")]
     models = [name for name in logs if name.endswith(".toml")]
     if len(models) > 1 or not paths:
@@ -286,7 +288,7 @@ def frf(
     if out:
         result.write_csv(out)
     if plot:
-        write_bode(result, plot)
+        save_picture(result.plot(), plot)
     return said_of(result, recorded.findings)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +10,14 @@ import numpy as np
 from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.frequency.plant import Banded, Plant
 from identify.output.numbers import Scale, listed, number, percent, pretty
+from identify.output.pictures import INKS
 from identify.results import figure_of, text_of
 from identify.results.frequency import FrequencyResponse
-from twin.files import atomic_writer
 from twin.model.units import AxisUnits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-INKS = ("#2f6db3", "#b4530f")  # measured and model, as on a page
 
 
 @text_of.register
@@ -91,13 +88,6 @@ def _with_band(one: Banded, unit: str) -> str:
     low, high = one.value - one.band, one.value + one.band
     value, band = scale.within(low, high, one.value, one.band)
     return f"{value} ± {band} {scale.unit}".rstrip()
-
-
-def write_bode(result: FrequencyResponse, path: Path) -> None:
-    """The Bode diagram of each axis as a picture, PNG, SVG or PDF by the name's ending."""
-    figure = bode(result)
-    with atomic_writer(path) as file:
-        figure.savefig(file, format=path.suffix[1:] or "png", dpi=150)
 
 
 @figure_of.register(FrequencyResponse)

@@ -6,14 +6,12 @@ whose modules take a second to load.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from identify.output.pictures import require_picture, save_picture
 from twin.effect import Effect
-from twin.errors import InputError
-from twin.files import write_atomically
 from twin.model.units import ROTARY
 
 if TYPE_CHECKING:
@@ -70,9 +68,6 @@ def effect_text(effect: Effect) -> str:
     )
 
 
-FORMATS = ("png", "svg", "pdf")
-
-
 def draw(effect: Effect, motion: Motion, force: NDArray[np.float64], path: Path) -> None:
     """Write the picture of the effect's force (n,) N along a motion, over time, place and speed.
 
@@ -80,10 +75,7 @@ def draw(effect: Effect, motion: Motion, force: NDArray[np.float64], path: Path)
     """
     import matplotlib
 
-    kind = path.suffix.lstrip(".")
-    if kind not in FORMATS:
-        raise InputError(f"{path}: cannot draw '{path.suffix}'; end the name in .png, .svg or .pdf")
-
+    require_picture(path)
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
@@ -99,10 +91,8 @@ def draw(effect: Effect, motion: Motion, force: NDArray[np.float64], path: Path)
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("Added force (N)")
     figure.suptitle(f"{effect.name}: {effect.fingerprint}", fontsize=10)
-    content = io.BytesIO()
-    figure.savefig(content, format=kind, dpi=130)
     plt.close(figure)
-    write_atomically(path, content.getvalue())
+    save_picture(figure, path)
 
 
 # --- the laws of effects, and checks of logs -------------------------------------------------

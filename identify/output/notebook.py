@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from identify.output.numbers import Scale, capitalised
+from identify.output.pictures import INKS
 from identify.output.report import SECTIONS, sections
 from identify.output.report.effects import fit_table
 from identify.output.report.explorer import coordinate_of_answer, named_signals
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = ("answer", "found", "regions", "parameters", "logs")  # sections of a report
-INKS = ("#2f6db3", "#b4530f")  # without and with what was found, as on a page
 
 
 def _subject(result: Diagnosis | Comparison) -> Subject:

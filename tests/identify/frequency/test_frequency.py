@@ -18,7 +18,7 @@ from identify.frequency.loop import loop_of
 from identify.frequency.plant import Banded, plant_of
 from identify.frequency.response import Record, response
 from identify.output.answers.answer import answer_of
-from tests.cli_runs import twin
+from tests.cli_runs import refusal, twin
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
@@ -190,6 +190,7 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     assert len(lines) > 50
     assert picture.read_bytes()[:4] == b"\x89PNG"
     answer = twin("frf", log, "--json", folder=tmp_path)
+    assert "end the name in .png" in refusal("frf", log, "--plot", "b.xyz", folder=tmp_path)
     plant = json.loads(answer.stdout)["axes"]["x"]["measured"]["plant"]
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
 
