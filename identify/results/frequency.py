@@ -48,7 +48,10 @@ class FrequencyResponse(Printed):
 
     def write_csv(self, path: Path) -> None:
         """A table: a line for each axis, source and frequency; units are in its first line."""
-        names = [f"{name} ({unit})" for name, unit in COLUMNS.items()]
+        names = []
+        for name, linear in COLUMNS.items():
+            units = dict.fromkeys(axis.units(linear) for axis in self.axes.values())
+            names.append(f"{name} ({' or '.join(units)})")
         lines = [",".join(["axis", "source", *names])]
         for name, axis in self.axes.items():
             for source, shown in (("measured", axis.measured), ("model", axis.modelled)):
