@@ -31,6 +31,8 @@ class Ended(SystemExit):
 def main() -> None:
     """Entry point of `twin`."""
     sys.unraisablehook = _swallowed
+    # What MuJoCo loads for drawing starts a Python of its own, which tells of the signal too.
+    os.environ.setdefault("MUJOCO_GL", "disable")
     for number in SIGNALS:
         signal.signal(number, _end)
     try:

@@ -51,7 +51,8 @@ def write_video(path: Path, replay: Replay, gain: float, speed: float, progress:
 
 def pictures(replay: Replay, gain: float, frames: Sequence[int]) -> Iterator[Pixels]:
     """Pictures of some frames, the first of them twice. Raises InputError where nothing draws."""
-    os.environ.setdefault("MUJOCO_GL", "egl")  # read once, as MuJoCo is imported
+    if os.environ.get("MUJOCO_GL", "disable") == "disable":  # read once, as MuJoCo is imported
+        os.environ["MUJOCO_GL"] = "egl"
     try:
         import mujoco
     except Exception as error:  # each library for drawing has errors of its own
