@@ -17,6 +17,7 @@ from identify.dataset.prepared_log import (
     PreparedLog,
     moving,
     scale_of,
+    split_by_log,
     sticks,
     total_force,
     total_forces,
@@ -83,8 +84,13 @@ def _table_between(axis: AxisModel) -> Table:
     return axis_table({"": parts_of(axis, *(set(Kind) - apart))})
 
 
-def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
-    """The motion behind the readings under the actual force, and what both add (n,) N."""
+def _driven(
+    axis: AxisModel, log: PreparedLog, whole: AxisModel | None = None
+) -> tuple[Motion, Array | float]:
+    """The motion behind the readings under the actual force, and what both add (n,) N.
+
+    whole: the axis of which this is a part, whose load it bears.
+    """
     motion, error_rate = true_motion(axis, log.motion)
     added: Array | float = 0.0
     driven = motion
@@ -92,7 +98,7 @@ def _driven(axis: AxisModel, log: PreparedLog) -> tuple[Motion, Array | float]:
         driven = motion.with_force(actual_force(axis, motion))
         added = log.fine.mean(driven.raw[1] - motion.raw[1])
     if _borne(axis):
-        driven = replace(driven, signals=np.stack([*driven.signals[:2], _load(axis, log)]))
+        driven = _under(driven, _load(whole or axis, log))
     if motion is not log.motion:
         added = added + axis.mass * log.fine.acceleration(error_rate)
     return driven, added
@@ -104,16 +110,33 @@ def _load(axis: AxisModel, log: PreparedLog) -> Array:
     In each block, from the means by test functions. Not the measured command: of that friction in
     its proportion takes noise as well, and "explains" it.
     """
-    loaded = _borne(axis)
-    acting = [f for f in axis.effects if f.effect.kind is not Kind.ACTUATION]
-    rest = replace(axis, effects=tuple(f for f in acting if f.effect.name not in loaded))
     bodies = log.fine.mean(log.motion.raw[1]) - log.command
-    asked = axis.mass * log.acceleration - averaged_force(rest, [log]) + bodies
-    load = np.interp(log.motion.time, log.time, asked)
+    asked = axis.mass * log.acceleration - averaged_force(_loading(axis), [log]) + bodies
+    return _sharpened(asked[None], log)[0]
+
+
+def _loading(axis: AxisModel) -> AxisModel:
+    """The axis with what makes the load of its friction alone."""
+    loaded = _borne(axis)
+    acting = (f for f in axis.effects if f.effect.kind is not Kind.ACTUATION)
+    return replace(axis, effects=tuple(f for f in acting if f.effect.name not in loaded))
+
+
+def _sharpened(means: Array, log: PreparedLog) -> Array:
+    """Forces (m, k) N by blocks whose means by test functions are these (m, n) N."""
+
+    def on_blocks(each: Array) -> Array:
+        return np.stack([np.interp(log.motion.time, log.time, own) for own in each])
+
+    out = on_blocks(means)
     for _ in range(SHARPENED):  # the means smooth it
-        short = asked - log.test_function.mean(load)
-        load += np.interp(log.motion.time, log.time, short)
-    return load
+        out += on_blocks(means - log.test_function.mean(out))
+    return out
+
+
+def _under(motion: Motion, force: Array) -> Motion:
+    """A motion under another force (n,) N by blocks."""
+    return replace(motion, signals=np.stack([*motion.signals[:2], force]))
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -197,17 +220,46 @@ def changes(
         out[rows, span] = along(log)
 
     spread(walk, product(_walks(axis, where, steps), zip(logs, spans, strict=True)))
+    if _borne(axis):
+        out += _by_load(axis, logs, where, steps)
     return out
+
+
+def _by_load(
+    axis: AxisModel,
+    logs: Sequence[PreparedLog],
+    where: Sequence[ParameterReference],
+    steps: Array,
+) -> Array:
+    """Change (m, n) N of the residual as parameters move the load of the friction."""
+    out, loading = np.zeros((len(where), sum(map(len, logs)))), _loading(axis)
+    own = [j for j, c in enumerate(where) if _loads(loading, c.effect)]
+    if not own:
+        return out
+    moved = split_by_log(-changes(loading, logs, [where[j] for j in own], steps[own]).T, logs)
+    rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
+    table = _table_between(rubbing)
+
+    def followed(job: tuple[PreparedLog, Array]) -> Array:
+        log, means = job
+        motion = _driven(rubbing, log, axis)[0]
+        loads = motion.signals[2] + _sharpened(means.T, log)
+        forces = np.stack([total_force(table, _under(motion, load)) for load in loads])
+        return log.test_function.mean(forces - total_force(table, motion))
+
+    out[own] = np.concatenate(spread(followed, zip(logs, moved, strict=True)), axis=1)
+    return out
+
+
+def _loads(loading: AxisModel, effect: str) -> bool:
+    """Whether an effect, "" the mass, is a part of the load; of sensing the whole is walked."""
+    return not effect or (
+        effect in loading.names and loading[effect].effect.kind is not Kind.SENSING
+    )
 
 
 def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -> Iterator[_Walk]:
     """For each walk along a log the parameters that it is for, and the change that they make."""
-    if _borne(axis) and where:  # every parameter adds to the load
-        values = read(axis, where)
-        each = zip(where, values, steps, strict=True)
-        moved = [write(axis, [c], [value + step]) for c, value, step in each]
-        yield [*range(len(where))], partial(_one_by_one, moved, axis)
-        return
     by_effect: dict[str, list[int]] = {}
     for j, c in enumerate(where):
         by_effect.setdefault(c.effect, []).append(j)
@@ -227,7 +279,7 @@ def _walks(axis: AxisModel, where: Sequence[ParameterReference], steps: Array) -
                 write(group, [c], [v + step])
                 for c, v, step in zip(own, read(group, own), steps[bent], strict=True)
             ]
-            yield bent, _difference(group, moved, effect)
+            yield bent, _difference(axis, group, moved, effect)
 
 
 def _by_strengths(
@@ -245,7 +297,9 @@ def _by_strengths(
     return np.asarray(columns[rows] * steps[:, None])
 
 
-def _difference(group: AxisModel, moved: Sequence[AxisModel], effect: str) -> _Along:
+def _difference(
+    axis: AxisModel, group: AxisModel, moved: Sequence[AxisModel], effect: str
+) -> _Along:
     """Change (m, n) N of the averaged force along a log when one effect's values move."""
     kind = group[effect].effect.kind
     # An effect alone of no strength gives no force, which need not be walked for.
@@ -259,10 +313,10 @@ def _difference(group: AxisModel, moved: Sequence[AxisModel], effect: str) -> _A
     table = _table_between(group)
     first = int(table.entries[table.labels.index(("", effect)), P_AT])
     sets = np.tile(table.parameters, (len(moved), 1))
-    for row, axis in zip(sets, moved, strict=True):
-        vector = axis[effect].vector()
+    for row, other in zip(sets, moved, strict=True):
+        vector = other[effect].vector()
         row[first : first + len(vector)] = vector
-    return partial(_together, group, table, sets, absent)
+    return partial(_together, axis, group, table, sets, absent)
 
 
 def _one_by_one(moved: Sequence[AxisModel], unmoved: AxisModel | None, log: PreparedLog) -> Array:
@@ -273,9 +327,11 @@ def _one_by_one(moved: Sequence[AxisModel], unmoved: AxisModel | None, log: Prep
     return np.stack([residual(axis, [log]) - base for axis in moved])
 
 
-def _together(group: AxisModel, table: Table, sets: Array, absent: bool, log: PreparedLog) -> Array:
+def _together(
+    axis: AxisModel, group: AxisModel, table: Table, sets: Array, absent: bool, log: PreparedLog
+) -> Array:
     """The change by sets (m, p) of the table's parameters in one walk; absent: from no force."""
-    motion = _driven(group, log)[0]
+    motion = _driven(group, log, axis)[0]
     unmoved = 0.0 if absent else total_forces(table, table.parameters[None], motion)
     at_once = max(AT_ONCE // motion.signals.shape[1], 1)
     batches = (sets[i : i + at_once] for i in range(0, len(sets), at_once))
