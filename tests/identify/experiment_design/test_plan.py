@@ -101,14 +101,8 @@ def separation(ranking) -> float:
     return ranking[0].delta_bic - ranking[1].delta_bic
 
 
-# The cheapest; those that differ in the actuator or the cable are in the long set.
-QUICK = (("asymmetry", "asymmetric_friction"),)
-
-
-@pytest.mark.parametrize(
-    ("name", "truth"),
-    [t if t in QUICK else pytest.param(*t, marks=pytest.mark.slow) for t in TRUTHS],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "truth"), TRUTHS)
 def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     case, machine = CASES[name], CASES[name].machine(truth)
     catalogue = Catalogue([CATALOGUE[e] for e in case.pair])

@@ -89,11 +89,13 @@ def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
     assert not any(getattr(e, "other", 0.0) for e in alone)
 
 
+TURNED = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5)  # rad
+
+
 @pytest.mark.parametrize(("noise", "scale"), [(1e-6, 6.8 / 0.34), (1e-4, 50.0 * 1e-4 / 2e-5)])
 def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     """The lengths of a linear stage, taken for rad, were lost in the noise of a rotary axis."""
-    hardware = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5, encoder_noise=noise)
-    turned = AxisModel(5e-6, hardware, rotary=True)
+    turned = AxisModel(5e-6, replace(TURNED, encoder_noise=noise), rotary=True)
     found, not_run = proposals(MachineModel("r", {"a": turned}, 400.0), "a", 20.0)
     assert not not_run
     short = [e.span for e in found if isinstance(e, Passes)][-4:]
@@ -103,10 +105,11 @@ def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     assert (rests.span, rests.speed) == pytest.approx((2e-3 * scale, 4e-3 * scale), rel=0.01)
     (stairs,) = (e for e in found if isinstance(e, Staircase))
     assert stairs.speeds[0] == pytest.approx(5e-4 * scale, rel=0.01)
-    slow = MachineModel(
-        "r", {"a": replace(turned, hardware=replace(hardware, velocity=1e-3))}, 400.0
-    )
-    found, not_run = proposals(slow, "a", 20.0)
+
+
+def test_a_velocity_map_of_a_slow_axis_is_as_fast_as_it_can_be():
+    slow = AxisModel(5e-6, replace(TURNED, velocity=1e-3), rotary=True)
+    found, not_run = proposals(MachineModel("r", {"a": slow}, 20.0), "a", 20.0)
     every = [*found, *(n.experiment for n in not_run)]
     (stairs,) = (e for e in every if isinstance(e, Staircase))
     assert (stairs.speeds[0], stairs.speeds[-1]) == (1e-4, 1e-3)

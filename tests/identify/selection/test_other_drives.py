@@ -15,6 +15,7 @@ def test_noise_of_the_force_is_no_friction_that_grows_with_it(hidden: str) -> No
     assert not [f for f in found["findings"] if f["mark"] == "wrong"]
 
 
+@pytest.mark.slow
 def test_friction_that_lags_is_no_channel_delay() -> None:
     """Presliding shifts the force at each reversal; it is named, though a delay explains much."""
     found = row("actuator", "nothing", Recorder(1000, 1000), 2)
