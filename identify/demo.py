@@ -16,7 +16,7 @@ from identify.experiment_design.planting import draw_effect, hidden_part, other_
 from identify.output.numbers import quantity
 from identify.output.report import Source, write_report
 from identify.results.addition import Addition
-from identify.results.results import Diagnosis, Feedforward
+from identify.results.results import Diagnosis, Feedforward, OnMachine
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -105,6 +105,7 @@ def demo(
         comparison=diagnosis.comparison,
         history=final.history,
         additions=[addition] if addition else [],
+        on_machine=OnMachine(worth=worth),
         source=Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
     )
     return Demo(hidden, diagnosis, addition, worth, report)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from identify.analysis.cable_force import cable_force as cable_force
 from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
@@ -39,6 +40,7 @@ from identify.results.results import (
     Diagnosis,
     Feedforward,
     FitResult,
+    OnMachine,
     SimulationFit,
     summary_of,
 )
@@ -372,6 +374,31 @@ def frequency_response(
     given = logs_by_name(logs)
     machine = None if model is None else as_model(model, catalogue)
     return FrequencyResponse(tuple(given), responses_of(given, machine, progress))
+
+
+def on_machine(
+    model: MachineModel,
+    logs: GivenLogs,
+    before: MachineModel | None = None,
+    *,
+    progress: Progress = silent,
+) -> OnMachine:
+    """The frequency response that logs show and the model makes, and what its feedforward gains.
+
+    before: the model without what was found, if anything was. What the logs do not tell, and what
+    the machine cannot run, is None.
+    """
+    given = logs_by_name(logs)
+    response = partial(frequency_response, given, model, progress=progress)
+    worth = partial(feedforward, model, given, before, progress=progress)
+    return OnMachine(_if_told(response), None if before is None else _if_told(worth))
+
+
+def _if_told(job: Callable[[], Any]) -> Any:
+    try:
+        return job()
+    except InputError:
+        return None
 
 
 def add_named(found: Diagnosis) -> Addition | None:

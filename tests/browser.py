@@ -75,9 +75,19 @@ class Browser:
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **size)
         self.events.clear()
-        self.call("Page.navigate", url=page.resolve().as_uri())
-        while not any(e["method"] == "Page.loadEventFired" for e in self.events):
+        address = page.resolve().as_uri()
+        self.call("Page.navigate", url=address)
+        while not self._loaded(address):  # what is heard first may be of the page before
             self._hear()
+
+    def _loaded(self, address: str) -> bool:
+        there = False
+        for event in self.events:
+            if event["method"] == "Page.frameNavigated":
+                there = event["params"]["frame"]["url"] == address
+            elif there and event["method"] == "Page.loadEventFired":
+                return True
+        return False
 
     def run(self, script: str) -> Any:
         """What a script, the body of a function, returns in the page."""

@@ -24,6 +24,7 @@ from identify.cli.shared import (
     Logs,
     Model,
     ModelOption,
+    Recordings,
     Report,
     Test,
     TestFunction,
@@ -37,7 +38,7 @@ from twin.errors import InputError
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.commands import Source
-    from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
+    from identify.results.results import Comparison, Diagnosis, FitResult, OnMachine, SimulationFit
     from twin.effects import Catalogue
 
 
@@ -110,7 +111,10 @@ def compare(
     result, findings, silent = with_logs(job, machine, logs)
     if html:
         source = _source(model, test_function, effects)
-        _report(html, f"{machine.name}: model against measurement", source, None, result, findings)
+        with progress_on_stderr() as progress:
+            known = workflow.on_machine(result.model, Recordings(logs), progress=progress)
+        title = f"{machine.name}: model against measurement"
+        _report(html, title, source, None, result, findings, known)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
     return said_of(result, [*findings, *silent], left_out=silent)
@@ -140,7 +144,12 @@ def diagnose(
     source = _source(model, test_function, effects)
     if html:
         title = f"{machine.name}: what the model lacks"
-        _report(html, title, source, result, result.comparison, findings)
+        with progress_on_stderr() as progress:
+            known = workflow.on_machine(
+                result.final_model, Recordings(logs), result.model if result.effect else None,
+                progress=progress,
+            )  # fmt: skip
+        _report(html, title, source, result, result.comparison, findings, known)
     answer = answer_of(result, data_faults=findings, left_out=silent)
     return Said(diagnose_text(result, source), answer, [*findings, *silent])
 
@@ -161,6 +170,7 @@ def _report(
     diagnosis: Diagnosis | None,
     comparison: Comparison,
     findings: Sequence[str],
+    known: OnMachine,
 ) -> None:
     """Write a report; findings: on the logs."""
     from identify.output.report import write_report
@@ -170,7 +180,7 @@ def _report(
         history=(diagnosis or comparison).model.history,
         assumed=[line for line in findings if "the import map assumes" in line],
         faults=[line for line in findings if ": error: " in line],
-        source=source,
+        source=source, on_machine=known,
     )  # fmt: skip
 
 
@@ -261,7 +271,7 @@ def frf(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Table of the responses to write (.csv).")
+        Path | None, typer.Option("--out", "-o", help="The responses to write (.csv, .mcap).")
     ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Bode diagram to write (.png, .svg, .pdf).")
@@ -274,7 +284,10 @@ def frf(
     """
     from identify import workflow
     from identify.output.pictures import require_picture, save_picture
+    from identify.results.frequency import FORMATS
 
+    if out and out.suffix not in FORMATS:
+        raise InputError(f"--out {out}: end the name in {' or '.join(FORMATS)}")
     if plot:
         require_picture(plot)
     paths = [Path(name) for name in logs if not name.endswith(".toml")]
@@ -286,7 +299,7 @@ def frf(
         recorded = CheckedRecordings(paths)
         result = workflow.frequency_response(recorded, machine, progress=progress)
     if out:
-        result.write_csv(out)
+        result.write(out)
     if plot:
         save_picture(result.plot(), plot)
     return said_of(result, recorded.findings)

@@ -33,42 +33,46 @@ def frequency_text(result: FrequencyResponse) -> str:
 
 
 def _shown(title: str, shown: Shown, units: AxisUnits) -> list[str]:
+    return [f"  {title}", *(f"    {name}: {value}" for name, value in read_off(shown, units))]
+
+
+def read_off(shown: Shown, units: AxisUnits) -> list[tuple[str, str]]:
+    """What a response tells, each by name in words, with its 90 % band."""
     found, kept = shown.response, shown.response.tells
-    lines = [f"  {title}"]
     if not kept.any():
-        return [*lines, "    nothing: the band of the response reaches zero at each frequency"]
-    told = found.frequency[kept]
-    part = f"{np.count_nonzero(kept)} of {len(kept)} frequencies"
-    lines.append(f"    told at {part}, {number(told[0])} to {number(told[-1])} Hz")
+        return [("frequencies", "none tells; the band of the response reaches zero at each")]
+    low, high = found.frequency[kept][[0, -1]]
+    part = f"{np.count_nonzero(kept)} of {len(kept)} tell"
+    facts = [("frequencies", f"{part}, {number(low)} to {number(high)} Hz")]
     if np.isfinite(found.noise).any():
         share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))
-        lines.append(f"    {percent(share)} of its variance is not noise but not linear (median)")
+        facts.append(("neither noise nor linear", f"{percent(share)} of its variance (median)"))
     if shown.plant is None:
-        lines.append("    too few to read a mass off; `twin simulate multisine` excites more")
-    else:
-        lines += [f"    {line}" for line in _plant(shown.plant, found.period, units)]
-    return [*lines, *(f"    {line}" for line in _loop(shown))]
+        few = "too few frequencies to read it off; `twin simulate multisine` excites more"
+        return [*facts, (units.mass_name, few), _loop(shown)]
+    return [*facts, *_plant(shown.plant, found.period, units), _loop(shown)]
 
 
-def _plant(plant: Plant, period: float, units: AxisUnits) -> list[str]:
-    lines = [f"{units.mass_name}: {_with_band(plant.mass, units.mass)}"]
+def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str]]:
+    facts = [(units.mass_name, _with_band(plant.mass, units.mass))]
     if plant.damping.band < plant.damping.value:
-        lines.append(f"viscous damping: {_with_band(plant.damping, units('N s/m'))}")
+        facts.append(("viscous damping", _with_band(plant.damping, units("N s/m"))))
     if plant.stiffness.band < plant.stiffness.value:
-        lines.append(f"stiffness: {_with_band(plant.stiffness, units('N/m'))}")
+        facts.append(("stiffness", _with_band(plant.stiffness, units("N/m"))))
     samples = f"{plant.delay.value / period:.2f} samples"
-    lines.append(f"delay: {_with_band(plant.delay, 's')}, {samples}")
-    for mode in plant.modes:
+    facts.append(("delay", f"{_with_band(plant.delay, 's')}, {samples}"))
+    for i, mode in enumerate(plant.modes, start=1):
         frequency, ratio = _with_band(mode.frequency, "Hz"), _with_band(mode.damping, "1")
         side = "motor and encoder on one side" if mode.gain.value > 0.0 else "beyond the spring"
-        lines.append(f"resonance: {frequency}, damping ratio {ratio}, {side}")
-    return lines
+        name = "resonance" if len(plant.modes) == 1 else f"resonance {i}"
+        facts.append((name, f"{frequency}, damping ratio {ratio}, {side}"))
+    return facts
 
 
-def _loop(shown: Shown) -> list[str]:
+def _loop(shown: Shown) -> tuple[str, str]:
     loop = shown.loop
     if loop is None:
-        return ["loop: not told, as the setpoint is fed forward, or there is none"]
+        return "loop", "not told, as the setpoint is fed forward, or there is none"
     by = "by the setpoint, if nothing is fed forward"
     by = "of the model's controller" if loop.by_controller else by
     crossing = "no crossover in the band"
@@ -78,8 +82,7 @@ def _loop(shown: Shown) -> list[str]:
             f"{math.degrees(loop.phase_margin):.0f} degrees"
         )
     gain = f", gain margin {number(loop.gain_margin)}" if math.isfinite(loop.gain_margin) else ""
-    peak = f"largest sensitivity {number(loop.peak)}"
-    return [f"loop {by}: {crossing}{gain}, {peak}"]
+    return f"loop {by}", f"{crossing}{gain}, largest sensitivity {number(loop.peak)}"
 
 
 def _with_band(one: Banded, unit: str) -> str:

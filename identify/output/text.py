@@ -260,16 +260,10 @@ def feedforward_text(result: Feedforward) -> str:
     lines = [f"in simulation, on the motion of {', '.join(result.logs)}"]
     for axis, found in result.axes.items():
         unit = result.model.axes[axis].units.position
-        errors = {
-            "feedback alone": found.without,
-            "with the feedforward of the model before": found.before,
-            "with that of the model": found.diagnosed,
-        }
         lines.append(f"axis {axis}: tracking error, RMS and largest")
         lines += [
             f"  {name}: {quantity(e.rms, unit)}, {quantity(e.largest, unit)}"
-            for name, e in errors.items()
-            if e is not None
+            for name, e in found.by_feedforward.items()
         ]
         lines += [f"    {e} gains {quantity(gain, unit)}" for e, gain in found.gains.items()]
         lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]

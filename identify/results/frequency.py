@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +15,7 @@ import numpy as np
 from identify.frequency.of_logs import AxisFrequency
 from identify.results import Printed, figure_of
 from twin.files import write_atomically
+from twin.signals import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,20 +50,55 @@ class FrequencyResponse(Printed):
         found = self.axes[axis or next(iter(self.axes))].measured.response
         return control.FRD(found.plant, 2.0 * np.pi * found.frequency, dt=found.period)
 
-    def write_csv(self, path: Path) -> None:
-        """A table: a line for each axis, source and frequency; units are in its first line."""
-        names = []
-        for name, linear in COLUMNS.items():
-            units = dict.fromkeys(axis.units(linear) for axis in self.axes.values())
-            names.append(f"{name} ({' or '.join(units)})")
-        lines = [",".join(["axis", "source", *names])]
+    def write(self, path: Path) -> None:
+        """A table (.csv), or a message an axis and source (.mcap); not with another ending.
+
+        Columns are those of ``COLUMNS``, with units in the first line or in the schema.
+        """
+        write_atomically(path, FORMATS[path.suffix](self))
+
+    def tables(self) -> Iterator[tuple[str, str, Mapping[str, Array]]]:
+        """Of each axis and source its columns, (n,) by name."""
         for name, axis in self.axes.items():
             for source, shown in (("measured", axis.measured), ("model", axis.modelled)):
-                if shown is None:
-                    continue
-                r = shown.response
-                columns = (r.frequency, r.plant.real, r.plant.imag, r.band, r.noise, r.distortion,
-                           r.coherence)  # fmt: skip
-                for row in zip(*columns, strict=True):
-                    lines.append(",".join([name, source, *(f"{v:.9g}" for v in row)]))
-        write_atomically(path, ("\n".join(lines) + "\n").encode())
+                if shown is not None:
+                    r = shown.response
+                    columns = (r.frequency, r.plant.real, r.plant.imag, r.band, r.noise,
+                               r.distortion, r.coherence)  # fmt: skip
+                    yield name, source, dict(zip(COLUMNS, columns, strict=True))
+
+
+def _csv(found: FrequencyResponse) -> bytes:
+    names = []
+    for name, linear in COLUMNS.items():
+        units = dict.fromkeys(axis.units(linear) for axis in found.axes.values())
+        names.append(f"{name} ({' or '.join(units)})")
+    lines = [",".join(["axis", "source", *names])]
+    for axis, source, columns in found.tables():
+        for row in zip(*columns.values(), strict=True):
+            lines.append(",".join([axis, source, *(f"{v:.9g}" for v in row)]))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _mcap(found: FrequencyResponse) -> bytes:
+    from mcap.writer import Writer
+
+    stream = BytesIO()
+    writer = Writer(stream)
+    writer.start(library="proton-twin")
+    for axis, source, columns in found.tables():
+        units = found.axes[axis].units
+        fields = {
+            name: {"type": "array", "items": {"type": ["number", "null"]}, "unit": units(linear)}
+            for name, linear in COLUMNS.items()
+        }
+        schema = json.dumps({"type": "object", "properties": fields}).encode()
+        known = writer.register_schema("frequency_response", "jsonschema", schema)
+        channel = writer.register_channel(f"/{axis}/frequency_response/{source}", "json", known)
+        told = {n: [v if isfinite(v) else None for v in c.tolist()] for n, c in columns.items()}
+        writer.add_message(channel, log_time=0, publish_time=0, data=json.dumps(told).encode())
+    writer.finish()
+    return stream.getvalue()
+
+
+FORMATS = {".csv": _csv, ".mcap": _mcap}

@@ -13,6 +13,7 @@ from identify.estimation.intervals import Estimate, estimates
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.results import Pictured, Printed
+from identify.results.frequency import FrequencyResponse
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.validation.comparison import AxisComparison
@@ -113,6 +114,20 @@ class Feedforward(Printed):
         return {name: followed(self.model.axes[name]).lost for name in self.axes}
 
 
+@dataclass(frozen=True, eq=False)
+class OnMachine:
+    """What a model says of the loop of its machine; None where the logs do not tell it.
+
+    response: of position to force, measured and modelled. worth: of the model's feedforward.
+    """
+
+    response: FrequencyResponse | None = None
+    worth: Feedforward | None = None
+
+
+UNTOLD = OnMachine()
+
+
 @dataclass(frozen=True)
 class AxisSummary:
     """The final model of an axis, and how it differs from the one that was fitted before.
@@ -181,6 +196,14 @@ class Diagnosis(Pictured):
     not_tried: tuple[str, ...] = ()
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
+
+    @property
+    def final_model(self) -> MachineModel:
+        """The model with everything that was found."""
+        model = self.model
+        for axis, found in self.axes.items():
+            model = model.with_axis(axis, found.final.axis) if found.findings else model
+        return model
 
     @property
     def leading(self) -> AxisDiagnosis:

@@ -51,6 +51,16 @@ class AxisTracking:
     gains: Mapping[str, float]
     """By effect, by how much the RMS error (m) grows where the feedforward leaves it out."""
 
+    @property
+    def by_feedforward(self) -> dict[str, TrackingError]:
+        """The errors by what is fed forward, in words."""
+        named = {
+            "feedback alone": self.without,
+            "with the feedforward of the model before": self.before,
+            "with that of the model": self.diagnosed,
+        }
+        return {name: error for name, error in named.items() if error is not None}
+
 
 def tracking(
     machine: MachineModel,

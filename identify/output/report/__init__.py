@@ -9,14 +9,14 @@ from pathlib import Path
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import quantity
-from identify.output.report import answer, effects, residual
+from identify.output.report import answer, effects, machine, residual
 from identify.output.report.explorer import explored
 from identify.output.report.page import Answer, Block, Heading, Part, Section
 from identify.output.report.page import page as whole_page
 from identify.output.report.subject import Subject
 from identify.output.words.commands import UNKNOWN, Source
 from identify.results.addition import Addition
-from identify.results.results import Comparison, Diagnosis
+from identify.results.results import UNTOLD, Comparison, Diagnosis, OnMachine
 from twin.files import require_writable, write_atomically
 from twin.model.file import format_model
 from twin.model.machine import HistoryStep
@@ -31,6 +31,8 @@ SECTIONS = (
     Part("equations", "The laws of the named effects", effects.equations),
     Part("parameters", "Parameters", effects.parameters),
     Part("logs", "Errors log by log", residual.logs),
+    Part("worth", "What it gains as feedforward", machine.worth),
+    Part("frequency", "The frequency response", machine.responses),
     Part("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
     Part("notes", "Notes", of_all=answer.notes),
 )
@@ -47,17 +49,18 @@ def write_report(
     assumed: Sequence[str] = (),
     source: Source = UNKNOWN,
     faults: Sequence[str] = (),
+    on_machine: OnMachine = UNTOLD,
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
 
     assumed, faults: findings of the log check on what import maps assume, and its errors, said
-    first. source: what the page was made of.
+    first. source: what the page was made of. on_machine: what the model says of its loop.
 
     One HTML file without outside references: styles, scripts and signals are inside. It appears
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    subject = Subject(title, diagnosis, comparison, history, additions, source)
+    subject = Subject(title, diagnosis, comparison, history, additions, source, on_machine)
     warnings = [("Not confirmed", line) for line in assumed] + [("Fault", line) for line in faults]
     text = whole_page(
         title, facts(subject), sections(subject), explored(subject), origin(subject), warnings
@@ -96,9 +99,8 @@ def facts(subject: Subject) -> list[tuple[str, str]]:
 
 def origin(subject: Subject) -> list[tuple[str, str]]:
     """The footer: by what, when and of which files the page was made."""
-    model = subject.comparison.model
-    for view in subject.views:
-        model = model.with_axis(view.name, view.final.axis) if view.final else model
+    diagnosis = subject.diagnosis
+    model = diagnosis.final_model if diagnosis else subject.comparison.model
     shown = [("Date", date.today().isoformat())]
     if subject.source.command:
         shown.append(("Command", subject.source.command))

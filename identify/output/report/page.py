@@ -90,15 +90,16 @@ class Chart:
     y: str
     lines: Sequence[Drawn]
     caption: str = ""
-    logarithmic: bool = False
+    log_x: bool = False
+    log_y: bool = False
 
     @property
     def spec(self) -> dict[str, Any]:
         """What report.js draws."""
         edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is Line.BAND]
         return {
-            "x": {"label": self.x[0], "values": printed(self.x[1]), "log": self.logarithmic},
-            "y": {"label": self.y, "log": self.logarithmic},
+            "x": {"label": self.x[0], "values": printed(self.x[1]), "log": self.log_x},
+            "y": {"label": self.y, "log": self.log_y},
             "series": [
                 {"label": typeset(d.label), "values": printed(d.values), "kind": d.line.value,
                  "color": d.ink.value}

@@ -84,7 +84,7 @@ def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
     ]
     caption = "RMS error in bands of half an octave, independent of the test function."
     label = scale.label(units.words("RMS force error"))
-    return Chart(("Frequency (Hz)", edges), label, lines, caption, logarithmic=True)
+    return Chart(("Frequency (Hz)", edges), label, lines, caption, log_x=True, log_y=True)
 
 
 # --- whether the residual is noise -----------------------------------------------------------

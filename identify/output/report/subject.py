@@ -11,7 +11,7 @@ from identify.estimation.fit import Fit
 from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
-from identify.results.results import AxisSummary, Comparison, Diagnosis
+from identify.results.results import UNTOLD, AxisSummary, Comparison, Diagnosis, OnMachine
 from identify.results.signals import Signals, signals_of
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -30,6 +30,7 @@ class Subject:
     history: Sequence[HistoryStep]
     additions: Sequence[Addition]
     source: Source = UNKNOWN
+    machine: OnMachine = UNTOLD
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:

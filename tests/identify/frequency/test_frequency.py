@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from scipy.signal import butter, lfilter
 
 import identify
@@ -23,7 +24,7 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log, write_log
-from twin.model.file import load_model
+from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.signals import Array
 
@@ -189,10 +190,30 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     assert head.startswith("axis,source,frequency (Hz),real (m/N)")
     assert len(lines) > 50
     assert picture.read_bytes()[:4] == b"\x89PNG"
+    twin("frf", log, "-o", "r.mcap", folder=tmp_path)
+    with (tmp_path / "r.mcap").open("rb") as stream:
+        ((schema, channel, message),) = make_reader(stream).iter_messages()
+    assert channel.topic == "/x/frequency_response/measured"
+    assert json.loads(schema.data)["properties"]["real"]["unit"] == "m/N"
+    real = [float(line.split(",")[3]) for line in lines]
+    np.testing.assert_allclose(json.loads(message.data)["real"], real, rtol=1e-8)
+    assert "end the name in .csv or .mcap" in refusal("frf", log, "-o", "r.txt", folder=tmp_path)
     answer = twin("frf", log, "--json", folder=tmp_path)
     assert "end the name in .png" in refusal("frf", log, "--plot", "b.xyz", folder=tmp_path)
     plant = json.loads(answer.stdout)["axes"]["x"]["measured"]["plant"]
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
+
+
+def test_a_page_shows_it_beside_the_model(log: Path, elastic: MachineModel, tmp_path: Path) -> None:
+    save_model(elastic, tmp_path / "m.toml")
+    done = twin("compare", "m.toml", log, "-o", "page.html", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "page.html").read_text()
+    shown = page[page.index('<section id="frequency"') :].partition("</section>")[0]
+    assert "Magnitude (dB of m/N)" in shown
+    row = re.search(r"<td>resonance</td>(.*?)</tr>", shown, re.DOTALL)
+    assert row is not None
+    assert len(re.findall(r"77\.\d+ ± ", row[1])) == 2  # measured and model
 
 
 def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from identify.output.report import Source
 from identify.output.report.explorer import shown_of
 from identify.output.words.diagnosis import verdict_in_words
 from identify.results.signals import Signals
+from identify.workflow import on_machine
 from twin.errors import InputError
 from twin.logs import write_log
 
@@ -65,6 +66,19 @@ def test_every_section_is_there(page: str) -> None:
     ]  # fmt: skip
     assert found == expected
     assert re.findall(r'<a href="#(\w+)">', page) == expected
+
+
+def test_what_is_named_is_shown_with_what_it_gains_as_feedforward(case: Case, tmp_path) -> None:
+    before, after = case.diagnosis.model, case.diagnosis.final_model
+    known = on_machine(after, case.held, before)
+    assert known.worth is not None
+    page = case.write(tmp_path / "w.html", on_machine=known)
+    found = known.worth.axes["x"]
+    shown = page[page.index('<section id="worth"') :].partition("</section>")[0]
+    assert f"cogging gains {typeset(quantity(found.gains['cogging'], 'm'))}" in shown
+    for error in (found.without, found.before, found.diagnosed):
+        assert typeset(quantity(error.rms, "m")) in shown
+    assert on_machine(after, case.held).worth is None  # nothing was found: nothing is gained
 
 
 def test_page_says_the_verdict(case: Case, page: str) -> None:
