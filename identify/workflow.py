@@ -29,6 +29,7 @@ from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
+from identify.links import is_better, suspects_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.output.words.addition import axis_in_words, notes_in_words
@@ -221,21 +222,24 @@ def diagnose(
     result = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    axes = {
-        axis: diagnose_axis(
-            fitted,
-            result.datasets[axis],
-            known,
-            within(progress, f"diagnosis of {axis}"),
-        )
-        for axis, fitted in result.fits.items()
-    }
+    suspects = suspects_of(result.model, result.fits, result.datasets)
+    offered = {axis: suspects.offered(known, axis) for axis in result.fits}
+    body = suspects.body
+    if body is None or not body.explains_all:
+        axes = _diagnosed(result.fits, result.datasets, offered, progress)
+    if body is not None:
+        with_it = within(progress, f"with another {body.body}")
+        beside = _diagnosed(body.fits, body.datasets, offered, with_it)
+        if body.explains_all or is_better(beside, axes):
+            axes = beside
+        else:
+            body = None
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
-    prepared = {axis: d.dataset for axis, d in axes.items()}
+    prepared = result.datasets if body else {axis: d.dataset for axis, d in axes.items()}
     return Diagnosis(
         model=model,
         axes=axes,
@@ -246,7 +250,22 @@ def diagnose(
         not_tried=tuple(name for name in catalogue if name not in known),
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
+        body=body,
     )
+
+
+def _diagnosed(
+    fits: Mapping[str, Fit],
+    found: Mapping[str, Dataset],
+    offered: Mapping[str, Catalogue],
+    progress: Progress,
+) -> dict[str, AxisDiagnosis]:
+    return {
+        axis: diagnose_axis(
+            fit, found[axis], offered[axis], within(progress, f"diagnosis of {axis}")
+        )
+        for axis, fit in fits.items()
+    }
 
 
 def _begun(
@@ -404,10 +423,16 @@ def _if_told(job: Callable[[], Any]) -> Any:
 def add_named(found: Diagnosis) -> Addition | None:
     """What ``add`` makes of the effect that a diagnosis names first, which it has fitted already.
 
-    None where it names none, or names it as one of a pair.
+    None where it names none, or names it as one of a pair, and where a body is to be put right
+    before.
     """
     leading, best = found.leading, found.leading.best
-    if best is None or not best.supported or not any(c is best for c in leading.ranking):
+    if (
+        found.body is not None
+        or best is None
+        or not best.supported
+        or not any(c is best for c in leading.ranking)
+    ):
         return None
     prepared = {axis: one.dataset for axis, one in found.axes.items()}
     return _with_notes(addition(best, leading.base, prepared, found.model, found.model))

@@ -19,6 +19,7 @@ from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
+from identify.links import WrongBody
 from identify.results.addition import Addition
 from identify.results.results import AxisSummary, Comparison, Diagnosis, FitResult, SimulationFit
 from identify.selection.acceptance import Score, Taken
@@ -210,6 +211,23 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
         {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
         left_over={"x": LEFT_OVER} if x and x.unexplained else {},
     )  # fmt: skip
+
+
+def wrong_body() -> WrongBody:
+    """A heavier fore arm, whose mass and half of whose inertia the joints do not tell."""
+    change = np.array([0.0, 0.12, 0.0, -0.01, 0.0, 0.024, 0.02, 0.0, 0.0, 0.0])
+    band = np.array([np.nan, 2e-3, 1e-3, 3e-3, np.nan, 1e-3, 2e-3, *3 * [np.nan]])
+    inertial = np.array([2.0, 0.3, 0.0, 0.0, 0.02, 0.08, 0.08, 0.0, 0.0, 0.0])
+    errors = {"x": errors_of(0.56, 0.0022), "y": errors_of(3.16, 0.02)}
+    return WrongBody(
+        "fore", ("upper",), ("x", "y"), inertial, change, band, score_of(0.98, 14.0, 0.3), errors,
+        {}, {},
+    )  # fmt: skip
+
+
+def errors_of(before: float, after: float) -> Errors:
+    """On the selection logs, N."""
+    return errors(before, after)[0]
 
 
 def fit_result() -> FitResult:

@@ -40,6 +40,11 @@ def actuator_saturation(p: Values, q: Columns) -> Results:
     return {U: q.u - p["loss"] * above}
 
 
+@written_from("u_actual = u (1 + error)")
+def torque_constant(p: Values, q: Columns) -> Results:
+    return {U: q.u + p["error"] * q.u}
+
+
 @written_from("u_actual(t) = u(t - tau)")
 def actuator_delay(p: Values, q: Columns) -> Results:
     """The impulse of the held command, tau later; before the log it was its first value."""

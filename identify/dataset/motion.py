@@ -71,20 +71,36 @@ class Bodies:
     """What the bodies of a mechanism take of one of its joints, (n,) each between a log's samples.
 
     momentum: N s, beyond mass x velocity. force: N, what they take beyond the change of momentum.
-    load: N, all that they take, smoothed. speeds (n_axes, n): m/s, smoothed, of all joints; index:
-    which of them this one is.
+    load: N, all that they take, smoothed. readings (n_axes, n + 1): m, of all joints, at the ends;
+    speeds (n_axes, n): m/s, smoothed, of all joints; index: which of them this one is.
     """
 
     momentum: Array
     force: Array
     load: Array
+    readings: Array
     speeds: Array
     index: int
 
+    def along(self, period: float) -> tuple[Array, Array, Array]:
+        """Positions, velocities and smoothed velocities (n_axes, n) of all joints, m and m/s.
+
+        period: s, of the readings.
+        """
+        return _middle(self.readings), between(self.readings, period), self.speeds
+
     def during(self, samples: slice) -> Bodies:
         """The same of some samples."""
-        momentum, force, load = (a[samples] for a in (self.momentum, self.force, self.load))
-        return Bodies(momentum, force, load, self.speeds[:, samples], self.index)
+        first, end, _ = samples.indices(len(self.momentum))
+        momentum, force, load = (a[first:end] for a in (self.momentum, self.force, self.load))
+        readings, speeds = self.readings[:, first : end + 1], self.speeds[:, first:end]
+        return Bodies(momentum, force, load, readings, speeds, self.index)
+
+    def with_more(self, momentum: Array, force: Array, samples: int, period: float) -> Bodies:
+        """The same where the bodies take more, (n,) N s and N; smoothed over so many samples."""
+        load = force + local_parabola(momentum, samples, derivative=1, period=period)
+        more = {"momentum": momentum, "force": force, "load": load}
+        return replace(self, **{name: getattr(self, name) + own for name, own in more.items()})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -415,17 +431,22 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
     position = np.stack(
         [together(a.position, a.columns.get("velocity"), log.period)[0] for a in told]
     )
-    samples = min(max(round(OF_JOINT / log.period), 5), position.shape[1] - 1)
-    samples -= 1 - samples % 2
+    samples = smoothed_over(log.period, position.shape[1])
     smooth = local_parabola(position, samples, derivative=1, period=log.period)
     velocity, speeds = between(position, log.period), _middle(smooth)
     momentum, force = mechanism.along(_middle(position), velocity, speeds)
     load = force + local_parabola(momentum, samples, derivative=1, period=log.period)
     momentum -= mechanism.inertia[:, None] * velocity
     return {
-        axis: Bodies(momentum[i], force[i], load[i], speeds, i)
+        axis: Bodies(momentum[i], force[i], load[i], position, speeds, i)
         for i, axis in enumerate(mechanism.axes)
     }
+
+
+def smoothed_over(period: float, count: int) -> int:
+    """Samples, odd, over which the motion of ``count`` samples of a joint is smoothed."""
+    samples = min(max(round(OF_JOINT / period), 5), count - 1)
+    return samples - (1 - samples % 2)
 
 
 def _middle(signals: Array) -> Array:

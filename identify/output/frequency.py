@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.frequency.plant import Banded, Plant
-from identify.output.numbers import Scale, listed, number, percent, pretty
+from identify.output.numbers import listed, number, percent, pretty, with_band
 from identify.output.pictures import INKS
 from identify.results import figure_of, text_of
 from identify.results.frequency import FrequencyResponse
@@ -86,11 +86,7 @@ def _loop(shown: Shown) -> tuple[str, str]:
 
 
 def _with_band(one: Banded, unit: str) -> str:
-    """A value with its 90 % band, e.g. "15.00 ± 0.02 kg"."""
-    scale = Scale.of(unit, [one.value, one.band])
-    low, high = one.value - one.band, one.value + one.band
-    value, band = scale.within(low, high, one.value, one.band)
-    return f"{value} ± {band} {scale.unit}".rstrip()
+    return with_band(one.value, one.band, unit)
 
 
 @figure_of.register(FrequencyResponse)

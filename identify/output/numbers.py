@@ -74,6 +74,13 @@ def quantity(value: float | None, unit: str) -> str:
     return Scale.of(unit, [0.0 if value is None else value]).text(value)
 
 
+def with_band(value: float, band: float, unit: str) -> str:
+    """A SI value with half its 90 % band, in the unit that suits it, e.g. "15.00 ± 0.02 kg"."""
+    scale = Scale.of(unit, [value, band])
+    first, second = scale.within(value - band, value + band, value, band)
+    return f"{first} ± {second} {scale.unit}".rstrip()
+
+
 def span(low: float, high: float, unit: str, between: str = "and") -> str:
     """Two SI values in the unit that suits them, e.g. "12.0 and 26.0 mm"."""
     scale = Scale.of(unit, [low, high])

@@ -10,6 +10,7 @@ from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity
 from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
+from identify.output.words.body import body_in_words
 from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import (
     all_found,
@@ -165,7 +166,8 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
 
     source: what stands for MODEL in the next command.
     """
-    lines = []
+    lines = body_in_words(result)
+    lines[1:] = [f"  {line}" for line in lines[1:]]
     for axis, d in result.axes.items():
         said, words = said_of(result, axis), d.base.axis.units.words
         named = f" Missing: {named_in_words(d)}." if d.named else ""

@@ -12,6 +12,7 @@ from identify.estimation.fit import Errors, Fit, error_in
 from identify.estimation.intervals import Estimate, estimates
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
+from identify.links import WrongBody
 from identify.results import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
 from identify.selection.acceptance import Judged
@@ -184,7 +185,8 @@ class Diagnosis(Pictured):
     refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
-    with a remainder, where that is largest.
+    with a remainder, where that is largest. body: of a mechanism, one whose inertia is not that of
+    its file; the diagnoses are those with it as it was found.
     """
 
     model: MachineModel
@@ -196,6 +198,7 @@ class Diagnosis(Pictured):
     not_tried: tuple[str, ...] = ()
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
+    body: WrongBody | None = None
 
     @property
     def final_model(self) -> MachineModel:

@@ -64,6 +64,31 @@ class Trial:
         force = judged.other[kept] * fit.lessened
         return cls(own, _Part(holdout, force, columns, kept), fit.floor**2, judged.other_floor**2)
 
+    @classmethod
+    def together(cls, several: Sequence[Judged]) -> Trial:
+        """The trial beside fits of several axes, each force in units of its own noise floor."""
+
+        def stacked(parts: Sequence[_Part], floors: Sequence[float]) -> _Part:
+            pairs = [*zip(parts, floors, strict=True)]
+            return _Part(
+                [log for p in parts for log in p.logs],
+                np.concatenate([p.force / floor for p, floor in pairs]),
+                _apart([p.base / floor for p, floor in pairs]),
+                np.concatenate([p.kept for p in parts]),
+            )
+
+        trials = [cls.beside(judged) for judged in several]
+        training = stacked([t.training for t in trials], [j.fit.floor for j in several])
+        others = [t.other for t in trials if t.other]
+        if len(others) < len(trials):
+            return cls(training, None, 1.0, 1.0)
+        return cls(training, stacked(others, [j.other_floor for j in several]), 1.0, 1.0)
+
+    def step(self, columns: Columns, *, sticking: bool) -> Array:
+        """The strengths (j,) of columns that one linear step finds, with a unit penalty."""
+        training = self._with(columns, sticking).training
+        return np.asarray(_steps(training.products(None))[0, training.base.shape[1] :])
+
     def part(self, columns: Columns, *, sticking: bool) -> float:
         """Part of the error above the floor that a linear step with columns takes (``acceptance``).
 
@@ -84,6 +109,15 @@ class Trial:
         training = self.training.with_columns(columns, sticking)
         other = self.other and self.other.with_columns(columns, sticking)
         return _Tried(training, other, self.quiet, self.other_quiet)
+
+
+def _apart(bases: Sequence[Array]) -> Array:
+    """Columns (n, k) of several axes as those of all of them: each zero for the others."""
+    rows, columns = (np.cumsum([0, *(b.shape[i] for b in bases)]) for i in (0, 1))
+    out = np.zeros((rows[-1], columns[-1]))
+    for i, base in enumerate(bases):
+        out[rows[i] : rows[i + 1], columns[i] : columns[i + 1]] = base
+    return out
 
 
 def change_of(before: Judged, after: Judged) -> Columns:

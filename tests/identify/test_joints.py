@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+
+import mujoco
 import numpy as np
 import pytest
 from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, arm_of, friction
@@ -9,15 +13,20 @@ from cli_runs import refusal, twin
 
 from identify.analysis.joint_signs import misassigned
 from identify.estimation.open_loop import open_loop
+from identify.links import suspects_of
+from identify.output.as_json import answer_of
+from identify.output.text import text_of
+from identify.selection.diagnosis import diagnose_axis
 from identify.selection.trying import try_effect
 from identify.workflow import compare, diagnose, fit
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.logs import read_log, write_log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
 from twin.simulator import MujocoSimulator
 
+FEW = Catalogue([load_catalogue()[n] for n in ("coulomb_viscous", "rotor_inertia", "gravity")])
 NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
 
@@ -202,3 +211,79 @@ def test_a_log_that_lacks_a_joint_is_one_line(folder):
     assert "has no axis 'elbow', which is a joint of arm.xml" in said
     said = refusal("new", "less.mcap", "--mjcf", "arm.xml", "-o", "other.toml", folder=folder)
     assert "the joints elbow are no axes" in said
+
+
+# --- bodies and motors that are not as the file says ------------------------------------------
+
+
+def loaded(model: mujoco.MjModel) -> None:
+    """A payload of 0.5 kg at 0.3 m on the fore arm."""
+    fore = model.body("fore").id
+    mass, centre, place = model.body_mass[fore], model.body_ipos[fore].copy(), np.array([0.3, 0, 0])
+    apart = place - centre
+    inertia = np.diag(model.body_inertia[fore]) + mass * 0.5 / (mass + 0.5) * (
+        apart @ apart * np.eye(3) - np.outer(apart, apart)
+    )
+    moments, turned = np.linalg.eigh(inertia)
+    turned[:, 0] *= np.sign(np.linalg.det(turned))
+    mujoco.mju_mat2Quat(model.body_iquat[fore], turned.ravel())
+    model.body_ipos[fore] = (mass * centre + 0.5 * place) / (mass + 0.5)
+    model.body_mass[fore], model.body_inertia[fore] = mass + 0.5, moments
+    model.body_sameframe[fore] = 0
+
+
+def heavier(model: mujoco.MjModel) -> None:
+    """An upper arm of 15 % more mass."""
+    model.body_mass[model.body("upper").id] *= 1.15
+
+
+def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
+    logs = [arm_log(seed, change=loaded) for seed in (11, 12)]
+    found = diagnose(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
+    body = found.body
+    assert body is not None
+    assert (body.body, body.level, body.axes) == ("fore", (), JOINTS)
+    assert body.told["mass"][0] == pytest.approx(0.5, rel=0.01)
+    assert body.told["first moment x"][0] == pytest.approx(0.15, rel=0.01)
+    assert body.told["inertia yy"][0] == pytest.approx(0.045, rel=0.02)
+    assert not any(d.findings for d in found.axes.values())
+    assert all(e.after < 0.05 * e.before for e in body.errors.values())
+    told = text_of(found)
+    assert told.startswith("The inertia of body fore is not as arm.xml has it (confidence 99 %)")
+    assert answer_of(found).entries()["body"]["parameters"]["mass"]["unit"] == "kg"
+    # What is said, written into the file, leaves nothing to be said.
+    (element,) = re.findall("<inertial .*?/>", told)
+    old = '<inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>'
+    (tmp_path / "arm.xml").write_text(ARM.replace(old, element))
+    shutil.copy(folder / "arm.toml", tmp_path)
+    again = diagnose(tmp_path / "arm.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
+    assert again.body is None
+    assert not any(d.findings for d in again.axes.values())
+
+
+@pytest.mark.parametrize(
+    ("change", "gain", "body", "motor"),
+    [
+        (heavier, 1.0, "upper", None),
+        (lambda _: None, 1.2, None, "shoulder"),
+        (lambda _: None, 1.0, None, None),
+    ],
+)
+def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(
+    folder, change, gain, body, motor
+):
+    logs = [arm_log(seed, change=change) for seed in (13, 14)]
+    for log in logs:
+        log.axes["shoulder"].columns["force"] *= gain
+    found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
+    told = suspects_of(found.model, found.fits, found.datasets)
+    assert told.motor == motor
+    assert (told.body and told.body.body) == body
+    if told.body:  # a column along its own joint and what turns with it
+        assert told.body.untold == ("mass", "first moment y")
+        assert told.body.told["first moment x"][0] == pytest.approx(0.12, rel=0.01)
+    if motor:
+        offered = told.offered(load_catalogue(), motor)
+        one = diagnose_axis(found.fits[motor], found.datasets[motor], offered)
+        assert one.named == ("torque_constant",)
+        assert one.findings[0].parameters["error"] == pytest.approx(1.0 / gain - 1.0, abs=0.01)

@@ -205,10 +205,11 @@ class AxisModel:
     def can_have(self, effect: Effect) -> bool:
         """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis.
 
-        What a joint's drive does to the command is asked beside its rotor's inertia, whose torque
-        a lag or a limit would imitate where the bodies are light.
+        What the drive of a joint does to the command, but for its torque constant, is asked beside
+        its rotor's inertia, whose torque a lag or a limit would imitate where the bodies are light.
         """
-        if effect.kind is Kind.ACTUATION and self.joint is not None and self.weighed is self:
+        drives = effect.kind is Kind.ACTUATION and effect.of_joints is None
+        if drives and self.joint is not None and self.weighed is self:
             return False
         present = [f.effect for f in self.effects]
         suits = effect.suits is None or effect.suits(present, self.rotary)

@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import mujoco
@@ -104,6 +105,63 @@ class Mechanism:
             *rows, np.zeros((5, self.model.nv)), momentum, force,
         )  # fmt: skip
         return momentum, force
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Name of the body that each axis moves, or of its joint where the body has none."""
+        joints = self.model.dof_jntid[self.places[1]]
+        return tuple(
+            self.model.body(self.model.jnt_bodyid[j]).name or self.model.joint(j).name
+            for j in joints
+        )
+
+    def moved_by(self, axis: int) -> list[int]:
+        """The axes whose forces the body of one changes: its own, and those that carry it."""
+        dof, found = int(self.places[1, axis]), []
+        while dof >= 0:
+            found.append(int(np.flatnonzero(self.places[1] == dof)[0]))
+            dof = int(self.model.dof_parentid[dof])
+        return sorted(found)
+
+    def inertial(self, axis: int) -> Array:
+        """The ten parameters of the body of an axis, as ``per_unit`` has them."""
+        model, turned = self.model, np.zeros(9)
+        body = model.jnt_bodyid[model.dof_jntid[self.places[1, axis]]]
+        mujoco.mju_quat2Mat(turned, model.body_iquat[body])
+        axes, mass, centre = turned.reshape(3, 3), model.body_mass[body], model.body_ipos[body]
+        own = axes @ np.diag(model.body_inertia[body]) @ axes.T
+        about = own + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        return np.array([mass, *(mass * centre), *about.diagonal(), *about[np.triu_indices(3, 1)]])
+
+    def per_unit(self, axis: int, *motion: Array) -> Array:
+        """Momentum and force, along a motion, of a unit more of each parameter of a body.
+
+        Of the body of that axis; motion as ``along`` has it; shape (2, 10, n_axes, n). The
+        parameters are mass, first moments x, y, z (kg m) and inertia xx, yy, zz, xy, xz, yz
+        (kg m^2) about the body's own frame. What the bodies take is linear in them (C. G. Atkeson,
+        C. H. An, J. M. Hollerbach, "Estimation of Inertial Parameters of Manipulator Loads and
+        Links", Int. J. Robotics Research 5, 1986).
+        """
+        begun = np.eye(10)[0]  # a body of some mass, whose centre is somewhere
+        of = (self._with(axis, begun + more) for more in (0.0 * begun, *np.eye(10)))
+        first, *others = (np.stack(m.along(*motion)) for m in of)
+        return np.stack([other - first for other in others], axis=1)
+
+    def _with(self, axis: int, inertial: Array) -> Mechanism:
+        """With the body of an axis of these parameters (10,)."""
+        model = copy(self.model)
+        body = model.jnt_bodyid[model.dof_jntid[self.places[1, axis]]]
+        mass, centre = inertial[0], inertial[1:4] / inertial[0]
+        xx, yy, zz, xy, xz, yz = inertial[4:]
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        moments, turned = np.linalg.eigh(
+            about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        )
+        turned[:, 0] *= np.sign(np.linalg.det(turned))
+        mujoco.mju_mat2Quat(model.body_iquat[body], turned.ravel())
+        model.body_mass[body], model.body_ipos[body] = mass, centre
+        model.body_inertia[body], model.body_sameframe[body] = moments, 0
+        return replace(self, model=model)
 
 
 def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:

@@ -9,6 +9,7 @@ from pydantic import Field
 from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
+from identify.links import INERTIAL, WrongBody
 from identify.output.answers.answer import Answer, Entry, File, Number, answer_of, read
 from identify.output.answers.fits import (
     EstimateEntry,
@@ -355,10 +356,49 @@ class DiagnosisEntry(Entry):
     next_experiment_refused: str | None
 
 
+class InertialEntry(Entry):
+    """An inertial parameter of a body, about the body's own frame."""
+
+    more: Number
+    """Than in the file."""
+    band_90: Number
+    """Half of its 90 % band."""
+    unit: str
+
+
+class ErrorsEntry(Entry):
+    """RMS force errors of an axis without and with a change."""
+
+    before: Number
+    after: Number
+    on: Role
+    unit: str
+
+
+class BodyEntry(Entry):
+    """A body of a mechanism whose inertia is not that of its file."""
+
+    body: str
+    ambiguous_with: list[str] = read("level")
+    axes: list[str]
+    """Whose forces it changes."""
+    confidence: Number
+    part: Number = read("score.part")
+    t: Number = read("score.t")
+    control: Number = read("score.control")
+    parameters: dict[str, InertialEntry]
+    """That differ from the file by more than their band."""
+    not_told: list[str] = read("untold")
+    """By these joints, or only together with others."""
+    errors: dict[str, ErrorsEntry]
+
+
 class DiagnosisAnswer(Answer, DiagnosisEntry):
     """What `twin diagnose` prints: the axis that the answer is about, and the same by axis."""
 
     axes: dict[str, DiagnosisEntry]
+    body: BodyEntry | None
+    """Of a mechanism, what is told of its bodies; the axes are told with it as it was found."""
     data_faults: list[str] = Field([])
     """What the check of the logs found."""
     left_out: list[str] = Field([])
@@ -368,7 +408,20 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
     leading = axes[result.leading.dataset.axis]
-    return DiagnosisAnswer.of(leading, axes=axes, **more)
+    body = result.body and _body(result.body, result)
+    return DiagnosisAnswer.of(leading, axes=axes, body=body, **more)
+
+
+def _body(found: WrongBody, result: Diagnosis) -> BodyEntry:
+    told = {
+        name: InertialEntry(more=value, band_90=band, unit=INERTIAL[name])
+        for name, (value, band) in found.told.items()
+    }
+    errors = {
+        axis: ErrorsEntry.of(own, unit=result.model.axes[axis].units.force)
+        for axis, own in found.errors.items()
+    }
+    return BodyEntry.of(found, parameters=told, errors=errors)
 
 
 def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from identify.dataset.dataset import Role
+from identify.links import WrongBody
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.addition import also_chose_in_words, errors_of_step, proved_in_words
+from identify.output.words.body import body_in_words
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
@@ -18,12 +20,34 @@ from twin.model.machine import HistoryStep
 
 
 def cards(view: AxisView) -> list[Block]:
-    """The card of an axis; before it, where nothing was diagnosed, one for its latest addition."""
+    """The card of an axis; before it, where nothing was diagnosed, one for its latest addition.
+
+    Before the first one that of a body, where one is not as its file has it.
+    """
     diagnosis = view.subject.diagnosis
     if diagnosis and view.found and view.summary and view.said:
-        return [_diagnosed(view, diagnosis, view.found, view.summary, view.said)]
+        first = diagnosis.body if view.name == view.subject.views[0].name else None
+        own = _diagnosed(view, diagnosis, view.found, view.summary, view.said)
+        return [*([_body(diagnosis, first)] if first else []), own]
     added = [a for a in view.subject.additions if a.step.axis == view.name]
     return [*(_added(a) for a in added[-1:]), _compared(view)]
+
+
+def _body(diagnosis: Diagnosis, body: WrongBody) -> Answer:
+    """The card of a body whose inertia is not that of its file."""
+    sentence, *others = body_in_words(diagnosis)
+    axes = diagnosis.model.axes
+    tiles = [
+        Tile(
+            axes[a].units.words(f"Force error, {a}"),
+            arrow(e.before, e.after, axes[a].units.force),
+            f"{e.on.value} logs, with the body as it was found",
+        )
+        for a, e in body.errors.items()
+        if a in body.axes
+    ]
+    headline = f"Body {' or '.join((body.body, *body.level))}: another inertia"
+    return Answer(headline, sentence, tiles, others, Tone.STRONG)
 
 
 def _diagnosed(

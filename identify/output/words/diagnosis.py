@@ -68,19 +68,25 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     beside = all_in_words(found)
     if found.small:
         beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
+    corrected = result.body is not None and axis in result.body.axes
+    body = f"with body {result.body.body} as it was found, " if result.body and corrected else ""
     advised = found.unexplained or any(f.shape for f in found.findings)
     return Said(
-        headline=headline_in_words(found),
-        verdict=words(verdict_in_words(found)),
+        headline=f"{body}{headline_in_words(found)}",
+        verdict=_beside(body, words(verdict_in_words(found))),
         findings=tuple(finding_in_words(f) for f in found.findings),
         beside=tuple(beside),
         shapes=tuple(shape_in_words(f.effect, f.shape) for f in found.findings if f.shape),
         left=tuple(left),
         advice=(advice(found.findings),) if advised else (),
-        commands=tuple(next_commands(found)),
+        commands=() if corrected else tuple(next_commands(found)),
         steps=tuple(step_lines(found)),
         notes=remarks_on(result, axis),
     )
+
+
+def _beside(body: str, verdict: str) -> str:
+    return capitalised(f"{body}{verdict[0].lower()}{verdict[1:]}") if body else verdict
 
 
 # --- the answer -------------------------------------------------------------------------------

@@ -98,6 +98,7 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "diagnosis: no experiment, refused": lambda: lost(
         refits={}, next_experiments={}, not_planned={"x": "no travel"}
     ),
+    "diagnosis: another body": lambda: replace(made.diagnosed(), body=made.wrong_body()),
     **{f"effect {n}": lambda n=n: effect_answer(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
     "laws": laws,
     "check": check,
@@ -130,7 +131,8 @@ def test_an_object_is_as_it_was_read_and_as_the_schema_says(name: str) -> None:
 
 def test_a_diagnosis_is_that_of_its_leading_axis() -> None:
     found = printed("diagnosis")
-    own = {k: v for k, v in found.items() if k not in ("axes", "data_faults", "left_out", "schema")}
+    of_all = {"axes", "body", "data_faults", "left_out", "schema"}
+    own = {k: v for k, v in found.items() if k not in of_all}
     assert list(found["axes"]) == ["y", "x"]
     assert own == found["axes"]["x"]
     assert [f["confidence"] for f in own["findings"]] == [f.confidence for f in made.FOUND]
