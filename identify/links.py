@@ -137,7 +137,8 @@ def suspects_of(
 ) -> Suspects:
     """The body or the motor that explains what the joints' models leave, where there is one.
 
-    fits, datasets: of the axes that move. Of long logs the beginnings tell it.
+    fits, datasets: of the axes that move. Of long logs the beginnings tell it. Asked are the bodies
+    and motors of joints that are above their noise floor.
     """
     if not model.joints:
         return Suspects()
@@ -145,20 +146,21 @@ def suspects_of(
 
     mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
     before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
-    left = {axis for axis, judged in before.items() if not judged.at_floor}
-    bodies = [_Body(mechanism, i) for i in range(len(mechanism.axes))]
-    every: list[_Rival] = [*bodies, *map(_Motor, fits)]
-    rivals = [r for r in every if left.intersection(r.axes)]
-    if not rivals:
+    left = [a for a in mechanism.axes if a in before and not before[a].at_floor]
+    if not left:
         return Suspects()
+    bodies = [_Body(mechanism, mechanism.axes.index(axis)) for axis in left]
+    rivals: list[_Body | _Motor] = [*bodies, *map(_Motor, left)]
     trial = _Trial.beside(before)
-    parts = [trial.part(rival) for rival in rivals]
+    parts = []
+    for rival in rivals:
+        parts.append(trial.part(rival))
+        rival.forget()
     first, *others = (rivals[i] for i in np.argsort(parts)[::-1])
     if max(parts) < RULE.promise * RULE.least_part:
         return Suspects()
     if isinstance(first, _Motor):
         return Suspects(motor=first.axis)
-    assert isinstance(first, _Body)
     next_body = [rival for rival in others if isinstance(rival, _Body)][:1]
     return Suspects(_accepted(first, next_body, len(rivals), trial, fits, datasets))
 
@@ -190,7 +192,7 @@ def _accepted(
     return WrongBody(
         body=body.name,
         level=tuple(r.name for r in rivals if is_level(r)),
-        axes=body.axes,
+        axes=tuple(axis for axis in body.axes if axis in fits),
         inertial=body.mechanism.inertial(body.index),
         change=change,
         band=_bands(body, trial, after),
@@ -224,12 +226,11 @@ def is_better(with_body: Mapping[str, AxisDiagnosis], without: Mapping[str, Axis
 class _Rival(Protocol):
     """What is linear in some parameters, over all joints."""
 
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """Whose forces it changes."""
-
     def forces(self, log: PreparedLog) -> Array:
         """Change (n, k) of the force residual, N per unit of each parameter."""
+
+    def forget(self) -> None:
+        """Let go of what it has computed for its forces."""
 
 
 @dataclass(frozen=True)
@@ -238,9 +239,8 @@ class _Motor:
 
     axis: str
 
-    @property
-    def axes(self) -> tuple[str, ...]:
-        return (self.axis,)
+    def forget(self) -> None:
+        pass
 
     def forces(self, log: PreparedLog) -> Array:
         own = log.motion.axis == self.axis
@@ -260,11 +260,15 @@ class _Body:
 
     @property
     def axes(self) -> tuple[str, ...]:
+        """Whose forces it changes."""
         return tuple(self.mechanism.axes[i] for i in self.mechanism.moved_by(self.index))
 
     @cached_property
     def _known(self) -> dict[tuple[int, int], Array]:
         return {}
+
+    def forget(self) -> None:
+        self._known.clear()
 
     def _per_unit(self, log: PreparedLog) -> Array:
         """Momentum and force (2, 10, n) of the log's own axis by each of INERTIAL, per unit."""
@@ -274,8 +278,9 @@ class _Body:
         key = (bodies.readings.__array_interface__["data"][0], bodies.readings.shape[1])
         if key not in self._known:
             motion = bodies.along(log.motion.sample_period)
-            self._known[key] = self.mechanism.per_unit(self.index, *motion)
-        return np.asarray(self._known[key][:, :, bodies.index])
+            every = self.mechanism.per_unit(self.index, *motion)
+            self._known[key] = every[:, :, self.mechanism.moved_by(self.index)]
+        return np.asarray(self._known[key][:, :, self.axes.index(log.motion.axis)])
 
     def forces(self, log: PreparedLog) -> Array:
         if log.motion.axis not in self.axes:
