@@ -230,7 +230,7 @@ class _Grid:
             np.allclose(np.diff(r.coordinate), first, atol=0.0) for r in records
         )
         cell = first if even else 1.0 / (CELLS_A_PERIOD * highest)
-        cells = _fast_length(int(np.ceil(max(r.span for r in records) / cell)) + 1)
+        cells = fast_length(int(np.ceil(max(r.span for r in records) / cell)) + 1)
         along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
         return cls(
             np.asarray(np.fft.rfftfreq(cells, cell)[WIDTH:], dtype=float),
@@ -382,7 +382,7 @@ def _medians(rows: Array, width: int) -> Array:
     return np.asarray(np.median(sliding_window_view(padded, width, axis=-1), axis=-1))
 
 
-def _fast_length(least: int) -> int:
+def fast_length(least: int) -> int:
     """The smallest length from ``least`` on whose only prime factors are 2, 3 and 5."""
     odd = (3**a * 5**b for a in range(16) for b in range(12))
     return min(n << (-(-least // n) - 1).bit_length() for n in odd)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.spectrum import fast_length
 from twin.errors import InputError
 from twin.signals import Array
 
@@ -162,7 +163,9 @@ class _Spectra:
         columns = np.hstack([self.instrument[at, None] * powers, powers])
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
-        inverse = np.linalg.pinv(columns / size, rcond=1e-12) / size[:, None]
+        unit = (columns / size).conj().T
+        inverse = np.linalg.pinv(unit @ unit.conj().T, rcond=1e-12, hermitian=True) @ unit
+        inverse /= size[:, None]
         rows = self.signals[at]
         found = inverse @ rows
         left = rows - columns @ found
@@ -184,7 +187,7 @@ def _repeats_after(signal: Array) -> int:
     In its first and its last period it may begin and end.
     """
     n = len(signal)
-    alike = np.fft.irfft(np.abs(np.fft.rfft(signal, 2 * n)) ** 2)[: n // 3]
+    alike = np.fft.irfft(np.abs(np.fft.rfft(signal, fast_length(2 * n))) ** 2)[: n // 3]
     inner = alike[1:-1]
     tops = np.flatnonzero((inner >= alike[:-2]) & (inner >= alike[2:]) & (inner > 0.3 * alike[0]))
     for cells in tops + 1:
