@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from identify.output.words.commands import Source
     from identify.results.results import Comparison, Diagnosis, FitResult, OnMachine, SimulationFit
     from twin.effects import Catalogue
+    from twin.model.machine import MachineModel
 
 
 class Objective(StrEnum):
@@ -220,10 +221,18 @@ def add(
 @app.command()
 def agree(
     a: Annotated[str, typer.Argument(metavar="A", help="Fitted model (.toml).")],
-    b: Annotated[str, typer.Argument(metavar="B", help="Fitted model (.toml).")],
+    b: Annotated[
+        str, typer.Argument(metavar="B", help="Fitted model (.toml), or what `twin export` wrote.")
+    ],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
+    ] = None,
     effects: Effects = None,
 ) -> Said:
-    """Say whether two fits agree within their uncertainties; exit code 1 where they do not.
+    """Say whether two fits agree within their uncertainties, or an export is still that of a model.
+
+    Exit code 1 where they do not.
 
     Example: twin agree monday.toml friday.toml
     """
@@ -231,11 +240,23 @@ def agree(
     from twin.model.file import load_model
 
     first, catalogue = loaded(a, effects)
+    if Path(b).suffix != ".toml" and Path(b).exists():
+        return _export_agrees(a, first, Path(b), logs or [])
     second = load_model(b, catalogue)
     with progress_on_stderr() as progress:
         progress("comparing the fits", 0, 1)
         result = workflow.agree(first, second, catalogue=catalogue)
     return said_of(result, fine=result.agrees, a=a, b=b)
+
+
+def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Path]) -> Said:
+    from identify.output.answers.machine import ExportAgreementAnswer
+    from identify.output.machine import export_agreement_text
+    from twin.export.agreement import compare_export
+
+    found = compare_export(model, path, Recordings(logs))
+    answer = ExportAgreementAnswer.of(found, a=name, b=path)
+    return Said(export_agreement_text(found, name, str(path)), answer, fine=found.agrees)
 
 
 @app.command()

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from twin.checks import CheckReport
     from twin.checks.long import AxisInfo, LogInfo
     from twin.export import Exported
+    from twin.export.agreement import ExportAgreement
     from twin.laws.verdict import LawReport
 
 
@@ -35,6 +36,18 @@ def export_text(made: Exported) -> str:
         lines.append(f"axis {axis}: keeps {', '.join(kept) or 'nothing'}")
         for word, remarks in (("nearly", made.approximated), ("lost", made.lost)):
             lines += [f"  {word}: {r.part}, {r.text}" for r in remarks if r.axis == axis]
+    return "\n".join(lines)
+
+
+def export_agreement_text(found: ExportAgreement, model: str, path: str) -> str:
+    """Whether exported files are those of a model, and where they are not."""
+    told = "as the model gives it" if found.agrees else "not as the model gives it now"
+    lines = [f"{path}: {', '.join(found.formats)} of {model}, {told}"]
+    for one in found.outdated:
+        if one.line is None:
+            lines.append(f"  {one.file}: is another file")
+        else:
+            lines.append(f"  {one.file}, line {one.line}: has {one.has!r}, the model {one.gives!r}")
     return "\n".join(lines)
 
 

@@ -57,6 +57,8 @@ class Exporter:
     """What it writes, in a few words."""
     export: Export
     """(model, logs by name) -> files; with logs it tells on them what is lost. Raises InputError"""
+    ending: str
+    """Of the name of a file that every export has."""
 
 
 def format_names() -> tuple[str, ...]:

@@ -256,6 +256,25 @@ class ExportAnswer(Answer):
     lost: list[RemarkEntry]
 
 
+class OutdatedEntry(Entry):
+    """A file that is not as the model gives it now: the first line that differs."""
+
+    file: File
+    line: int | None
+    has: str
+    gives: str
+
+
+class ExportAgreementAnswer(Answer):
+    """What `twin agree` prints of exported files."""
+
+    agrees: bool
+    formats: list[str]
+    outdated: list[OutdatedEntry]
+    a: File
+    b: File
+
+
 class ExamplesAnswer(Answer):
     """What `twin example` prints: what each example is."""
 

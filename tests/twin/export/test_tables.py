@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
@@ -10,7 +12,9 @@ import numpy as np
 import pytest
 from cli_runs import refusal, twin
 from effect_runs import CATALOGUE
+from strict_json import valid
 
+from identify.testing import assert_exported
 from twin.errors import InputError
 from twin.export import find_exporter
 from twin.export.tables import fewest_points, motions, tables
@@ -170,3 +174,25 @@ def test_ros2_control_has_the_limits_and_a_straight_friction() -> None:
                  "has_effort_limits: false"):  # fmt: skip
         assert line in limits
     assert {"cogging", "cable_slab", "asymmetric_friction"} <= {r.part for r in made.lost}
+
+
+@pytest.mark.parametrize("to", ["c", "csv", "twincat", "ros2_control"])
+def test_an_export_is_told_to_be_that_of_the_model_or_of_one_before(tmp_path, to) -> None:
+    model = MachineModel("drive", {"x": AxisModel(2.0, HARDWARE, PLAIN)}, 1000.0)
+    save_model(model, tmp_path / "m.toml")
+    assert twin("export", "m.toml", "--to", to, "-o", "out", folder=tmp_path).returncode == 0
+    same = twin("agree", "m.toml", "out", folder=tmp_path)
+    assert (same.returncode, same.stdout) == (0, f"out: {to} of m.toml, as the model gives it\n")
+    assert_exported(tmp_path / "m.toml", tmp_path / "out")
+    changed = (fitted("coulomb_viscous", Fc=0.55, Fs=0.55, sigma2=2.0), *PLAIN[1:])
+    save_model(model.with_axis("x", replace(model.axes["x"], effects=changed)), tmp_path / "n.toml")
+    other = twin("agree", "n.toml", "out", "--json", folder=tmp_path)
+    found = valid(json.loads(other.stdout))
+    assert (other.returncode, found["agrees"], found["formats"]) == (1, False, [to])
+    first = found["outdated"][0]
+    lines = (tmp_path / first["file"]).read_text().splitlines()
+    assert lines[first["line"] - 1].strip() == first["has"] != first["gives"]
+    with pytest.raises(AssertionError, match=re.escape(f"line {first['line']}: has")):
+        assert_exported(tmp_path / "n.toml", tmp_path / "out")
+    (tmp_path / "empty").mkdir()
+    assert "holds no export of drive" in refusal("agree", "m.toml", "empty", folder=tmp_path)

@@ -15,4 +15,6 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     return Exported(files, made.kept, made.approximated, made.lost)
 
 
-EXPORTER = Exporter("C99 feedforward from the setpoint: force or current of each axis", export)
+EXPORTER = Exporter(
+    "C99 feedforward from the setpoint: force or current of each axis", export, ".c"
+)

@@ -66,4 +66,4 @@ def csv_text(columns: Mapping[str, Array]) -> str:
     return "\n".join([",".join(columns), *(",".join(f"{v:.9g}" for v in r) for r in rows)]) + "\n"
 
 
-EXPORTER = Exporter("tables over position, speed and phase of a pitch", export)
+EXPORTER = Exporter("tables over position, speed and phase of a pitch", export, ".csv")

@@ -160,4 +160,4 @@ def _compiled(name: str, sources: Mapping[str, str]) -> tuple[dict[str, bytes], 
     return {f"binaries/{system}{bits}/{name}{suffix}": content}, ""
 
 
-EXPORTER = Exporter("FMI 2.0 co-simulation for Simulink, Modelica and others", export)
+EXPORTER = Exporter("FMI 2.0 co-simulation for Simulink, Modelica and others", export, ".fmu")

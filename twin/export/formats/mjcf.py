@@ -175,4 +175,6 @@ def _swing(axis: AxisModel) -> tuple[Array, float]:
     return _motion(0.5 * (low + high) + reach * np.sin(turn), SAMPLE)
 
 
-EXPORTER = Exporter("the machine's own MuJoCo file with the joints' friction and springs", export)
+EXPORTER = Exporter(
+    "the machine's own MuJoCo file with the joints' friction and springs", export, ".xml"
+)

@@ -88,4 +88,6 @@ def _joint(name: str, axis: AxisModel, of: AxisTables) -> str:
     )
 
 
-EXPORTER = Exporter("joint limits of ros2_control, friction of the robot's description", export)
+EXPORTER = Exporter(
+    "joint limits of ros2_control, friction of the robot's description", export, ".yaml"
+)

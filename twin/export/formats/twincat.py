@@ -93,4 +93,4 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
     return files
 
 
-EXPORTER = Exporter("friction compensation table of TwinCAT CNC, cogging as tables", export)
+EXPORTER = Exporter("friction compensation table of TwinCAT CNC, cogging as tables", export, ".lis")
