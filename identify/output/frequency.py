@@ -55,9 +55,9 @@ def read_off(shown: Shown, units: AxisUnits) -> list[tuple[str, str]]:
 
 def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str]]:
     facts = [(units.mass_name, _with_band(plant.mass, units.mass))]
-    if plant.damping.band < plant.damping.value:
+    if _is_there(plant.damping):
         facts.append(("viscous damping", _with_band(plant.damping, units("N s/m"))))
-    if plant.stiffness.band < plant.stiffness.value:
+    if _is_there(plant.stiffness):
         facts.append(("stiffness", _with_band(plant.stiffness, units("N/m"))))
     samples = f"{plant.delay.value / period:.2f} samples"
     facts.append(("delay", f"{_with_band(plant.delay, 's')}, {samples}"))
@@ -67,6 +67,11 @@ def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str
         name = "resonance" if len(plant.modes) == 1 else f"resonance {i}"
         facts.append((name, f"{frequency}, damping ratio {ratio}, {side}"))
     return facts
+
+
+def _is_there(one: Banded) -> bool:
+    """Whether a band twice as wide would not reach zero, as of a response that tells."""
+    return 2.0 * one.band < one.value
 
 
 def _loop(shown: Shown) -> tuple[str, str]:
