@@ -11,7 +11,16 @@ import numpy as np
 
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment, OneAxis, gentle, machine_limits
-from twin.experiments.kinds import Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
+from twin.experiments.kinds import (
+    Moves,
+    Multisine,
+    Passes,
+    Rests,
+    Staircase,
+    Steps,
+    Sweep,
+    Tracking,
+)
 from twin.experiments.lasting import ALLOWED, lasting
 from twin.experiments.trajectory import Limits
 from twin.model.machine import AxisModel, MachineModel
@@ -28,6 +37,7 @@ STAGE = 0.34  # m, travel of the linear stage for which these are; of angles see
 SEEN = 50.0  # times the noise and the step of the encoder, that an angle must be
 LOWEST = 2.0  # Hz, where a sweep begins
 SWEPT = (60.0, 120.0)  # Hz, where it ends: the shortest test functions pass little above
+PERIODS = 6  # of a multisine, of which the first and the last begin and end it
 EFFORTS = (1.0, 0.3)  # parts of the acceleration limit that steps use in turn
 STEP_DWELL = 0.05  # s
 MARGIN = 0.5  # part of the allowed force that a sweep uses; the loop adds to it near its bandwidth
@@ -65,7 +75,8 @@ def proposals(
     effort = min(
         1.0, FORCE_USED * own.hardware.force_limit / (own.mass * own.hardware.acceleration)
     )
-    room = _Room(own, axis, gentle(limits[axis], effort), other, duration, _scale(own))
+    limit, scale = gentle(limits[axis], effort), _scale(own)
+    room = _Room(own, axis, limit, other, duration, scale, model.sample_rate)
     drafts = (
         *room.general(),
         *room.passing(),
@@ -119,7 +130,8 @@ class _Room:
     """What the experiments of one axis may use.
 
     limit: as far as the motor's force allows. other: m, span of the other axis, 0 where there is
-    none, or are several. duration: s. scale: of the lengths and speeds of a stage.
+    none, or are several. duration: s. scale: of the lengths and speeds of a stage. rate: Hz, of the
+    machine's samples.
     """
 
     model: AxisModel
@@ -128,6 +140,7 @@ class _Room:
     other: float
     duration: float
     scale: float
+    rate: float
 
     def general(self) -> Iterator[Experiment]:
         """Motion of all axes."""
@@ -187,12 +200,15 @@ class _Room:
                 yield Steps(self.axis, span, neat(span / count), tuple(efforts), STEP_DWELL)
 
     def swept(self) -> Iterator[Experiment]:
-        """A force sweep on slow passes, over the whole travel and at one place."""
+        """A force sweep on slow passes, over the whole travel and at one place; many sines."""
         for part, highest in itertools.product((1.0, 0.1), SWEPT):
             span = self.span(part)
             speed = neat(min(2.4 * span / self.duration, self.limit.fastest_plateau(span)))
             weak = Sweep(self.axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
             yield replace(weak, amplitude=neat(MARGIN * weak.most_force(self.model)))
+        period, highest = neat(self.duration / PERIODS), min(SWEPT[-1], 0.4 * self.rate)
+        if highest > LOWEST:
+            yield Multisine(self.axis, period, 1, self.span(0.1), LOWEST, highest, phases=1)
 
 
 def _move_time(limit: Limits, distance: float) -> float:
