@@ -43,12 +43,14 @@ class Taken:
     """What a change takes of the squared error of some logs.
 
     t: logarithmic gain over blocks, over its standard error. whole, typical: part of what is left
-    above the noise floor, of all of it and of that of a typical block, at most 1.
+    above the noise floor, of all of it and of that of a typical block, at most 1. apart: the mean
+    square of what the two models foretell differently, over that of what is left.
     """
 
     t: float
     whole: float
     typical: float
+    apart: float = 1.0
 
     @property
     def part(self) -> float:
@@ -186,6 +188,23 @@ def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -
     return Score(training, other, control, among)
 
 
+def prefers(one: Judged, other: Judged) -> bool:
+    """Whether the logs clearly prefer one model to another, where both explain them.
+
+    Logs for which the two foretell the same force, or nearly, say nothing of it. All others have
+    to agree; and where more than noise is left, which one of the two may take by chance, on a
+    difference that matters.
+    """
+    by = score(other, one)
+    groups = (by.training, by.other)
+    if one.at_floor:
+        sure = max(g.t for g in groups) >= RULE.least_bic**0.5
+        return sure and min(g.t for g in groups) > -least_t(1)
+    telling = [g for g in groups if g.apart >= RULE.least_part]
+    clear = (g.t >= least_t(1) and g.part >= RULE.least_part for g in telling)
+    return bool(telling) and all(clear)
+
+
 def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Taken:
     """What ``after`` takes of residuals (n,) N, where both tell something.
 
@@ -193,7 +212,7 @@ def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Tak
     """
     both = np.isfinite(before) & np.isfinite(after)
     if not both.any():
-        return Taken(0.0, 0.0, 0.0)
+        return Taken(0.0, 0.0, 0.0, 0.0)
     spans, quiet = blocks_of(int(both.sum())), floor**2
     first = [span.start for span in spans]
     count = np.array([span.stop - span.start for span in spans])
@@ -201,7 +220,10 @@ def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Tak
     gains = np.log((squares[0] + quiet) / (squares[1] + quiet))
     spread = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     t = (gains.mean() - charge) / spread if spread > 0.0 else 0.0
-    return Taken(float(t), *parts(squares[0], squares[1], count, quiet))
+    apart = np.mean((before - after)[both] ** 2) / _left(
+        np.average(squares[0], weights=count), quiet
+    )
+    return Taken(float(t), *parts(squares[0], squares[1], count, quiet), float(apart))
 
 
 def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[float, float]:
@@ -227,6 +249,9 @@ def larger(whole: float, typical: float) -> float:
 
 def part_of(before: float, after: float, quiet: float) -> float:
     """Part that is taken of a mean square N^2 above the squared noise floor (N^2), at most 1."""
-    # No less is ever left above a floor than that by which it is uncertain.
-    left = max(before - quiet, (RULE.at_floor**2 - 1.0) * quiet, TINY)
-    return min((before - after) / left, 1.0)
+    return min((before - after) / _left(before, quiet), 1.0)
+
+
+def _left(square: float, quiet: float) -> float:
+    """What is left above a floor: never less than that by which this is uncertain; all N^2."""
+    return max(square - quiet, (RULE.at_floor**2 - 1.0) * quiet, TINY)

@@ -202,5 +202,9 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
 
 
 def ordered(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Proved ones first, then those that were refitted, then by what they leave."""
-    return tuple(sorted(candidates, key=lambda c: (not c.supported, c.score is None, c.gain.after)))
+    """Proved ones first, by their evidence; then those that were refitted, by what they leave."""
+
+    def place(c: Candidate) -> tuple[bool, bool, float]:
+        return not c.supported, c.score is None, -c.delta_bic if c.supported else c.gain.after
+
+    return tuple(sorted(candidates, key=place))

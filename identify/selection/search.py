@@ -20,7 +20,7 @@ from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, least_t, score
+from identify.selection.acceptance import Judged, least_t, prefers, score
 from identify.selection.candidates import Candidate, candidate_of, ordered
 from identify.selection.changes import Added, Change, Look, Reshaped, control, freed_of
 from identify.selection.controls import Trial
@@ -229,12 +229,11 @@ def _on_final_dataset(final: Judged, found: Found) -> Found:
 
 
 def is_level(one: Tried, best: Tried) -> bool:
-    """Whether the logs do not tell two changes apart, or by too little to matter."""
+    """Whether the logs do not clearly prefer the better of two changes."""
     effects = [t.change.effect for t in (one, best) if isinstance(t.change, Added)]
     if len(effects) == 2 and all(e.dead_time for e in effects):
         return True  # which of the two is late, no log of both can tell
-    by = score(one.judged, best.judged)
-    return by.t < least_t(1) or by.part < RULE.least_part
+    return not prefers(best.judged, one.judged)
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
@@ -246,16 +245,24 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return [Step(noise[0])]
     if not lowering:
         return []
-    best = max(lowering, key=lambda t: t.candidate.part)
+    best = _best_of(lowering)
     if isinstance(best.change, Reshaped):
         lowering = _laws_for(best, judged, tried) or lowering
-        best = max(lowering, key=lambda t: t.candidate.part)
+        best = _best_of(lowering)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     level = [t for t in (best, *level) if t is not first]
     others = [t for t in proved if t not in (first, *level)]
     rivals = [t for t in others if _adds_friction(t.change)] if _adds_friction(first.change) else []
     return [Step(first, tuple(level), tuple(rivals))]
+
+
+def _best_of(tried: Sequence[Tried]) -> Tried:
+    """The change that takes most, or the one that the logs clearly prefer to it."""
+    best, *others = sorted(tried, key=lambda t: -t.candidate.part)
+    for one in others:
+        best = best if is_level(best, one) else one
+    return best
 
 
 def _adds_friction(change: Change) -> bool:

@@ -85,6 +85,7 @@ def tried_beside(
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
         tried += _refitted(judged, best, len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
+    tried = _with_alike_evidence(tried)
     trim_memory()
     noise = [as_noise(judged, e) for e in effects if is_noise(e)]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
@@ -201,6 +202,17 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     if refitted.fit.error > SETTLED * judged.fit.error:
         return judged, tried
     return refitted, [_scored_again(refitted, t) for t in tried]
+
+
+def _with_alike_evidence(tried: list[Tried]) -> list[Tried]:
+    """The changes with evidence that can be compared: by the samples of the best one's residual."""
+    every = [t.candidate.evidence for t in tried]
+    samples = max(every, key=lambda e: e.log_gain).samples if every else 0.0
+    alike = [
+        replace(t.candidate, evidence=replace(e, samples=samples))
+        for t, e in zip(tried, every, strict=True)
+    ]
+    return [replace(t, candidate=c) for t, c in zip(tried, alike, strict=True)]
 
 
 def _scored_again(judged: Judged, tried: Tried) -> Tried:
