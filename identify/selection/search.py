@@ -358,7 +358,8 @@ def _needed(
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = refitted_on(axis, judged, judged)
-            if isinstance(steps[-1].change, Reshaped) and _is_held(step.change, without, judged):
+            curve = isinstance(steps[-1].change, Reshaped) and not step.with_others
+            if curve and _is_held(step.change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
             if _is_needed(step.change, without, judged):
