@@ -89,7 +89,8 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
     """Shapes where they stand at rest, the joints that move them, camera and marks."""
     model, data = stage.model, mujoco.MjData(stage.model)
     mujoco.mj_forward(model, data)
-    names = {int(model.joint(axis).id): i for i, axis in enumerate(replay.axes)}
+    joints = [replay.machine.joints.get(axis, axis) for axis in replay.axes]
+    names = {int(model.joint(joint).id): i for i, joint in enumerate(joints)}
     chains = [_chain(model, data, body, names) for body in range(model.nbody)]
     links: list[list] = []
     for chain in chains:
@@ -111,9 +112,10 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
             geom["mesh"] = meshes.setdefault(int(model.geom_dataid[i]), len(meshes))
         geoms.append(geom)
     marks = [
-        {"link": link_of[body],
+        {"axis": i, "link": link_of[body],
          "at": _short(data.xpos[body] + data.xmat[body].reshape(3, 3) @ place)}
-        for body, place in stage.marks.values()
+        for i, (axis, (body, place)) in enumerate(stage.marks.items())
+        if np.isfinite(replay.axes[axis].setpoint).any()
     ]  # fmt: skip
     share = OF_MESHES // max(len(meshes), 1)
     return {

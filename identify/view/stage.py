@@ -1,22 +1,21 @@
-"""What the machine looks like: its MuJoCo model, posed as a replay says; shapes of plain axes."""
+"""The machine as it is shown: its MuJoCo model, posed as a replay says."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
+from identify.view.looks import dress, joints_spec
 from identify.view.replay import Replay
-from twin.errors import InputError
 from twin.mujoco.mjcf import machine_spec
 from twin.signals import Array
 
 LARGEST = 1280  # pixels of a picture
 GHOST = (0.20, 0.55, 1.00, 0.40)  # of the modelled machine, red green blue alpha
 MARK = (1.00, 0.45, 0.05, 1.0)  # of the setpoint
-GREY, DARK, BLUE = (0.70, 0.72, 0.75, 1), (0.25, 0.27, 0.30, 1), (0.25, 0.42, 0.60, 1)
 BEHIND = 0.998  # of its size, at which a ghost that is where the machine is lies hidden in it
 SHADOW = 1024  # pixels of its map: what a display without a graphics card draws in time
 ABOVE = 0.04  # of the machine, by which a mark stands above its axis
@@ -43,9 +42,12 @@ class Stage:
         model = _spec(replay).compile()
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        at = {a: int(model.joint(a).qposadr[0]) for a in replay.machine.axes}
+        machine = replay.machine
+        joints = {axis: machine.joints.get(axis, axis) for axis in machine.axes}
+        at = {axis: int(model.joint(joint).qposadr[0]) for axis, joint in joints.items()}
         others = (mujoco.MjData(model) for _ in range(2))
-        return cls(model, at, {a: _mark(model, data, a) for a in replay.axes}, data, *others)
+        marks = {axis: _mark(model, data, joints[axis]) for axis in replay.axes}
+        return cls(model, at, marks, data, *others)
 
     def pose(self, replay: Replay, frame: int, gain: float) -> None:
         """Stand as in a frame, with the differences to the measured machine enlarged."""
@@ -85,17 +87,15 @@ class Stage:
 def _spec(replay: Replay) -> mujoco.MjSpec:
     """The machine without what effects attach, which no log tells the motion of."""
     machine = replay.machine
-    bare = {name: replace(axis, effects=()) for name, axis in machine.axes.items()}
-    # Where a motion is imposed there is no mass, but a body has one.
-    bare = {name: replace(a, mass=a.mass or 1.0) for name, a in bare.items()}
     if machine.joints:
-        raise InputError(
-            f"{machine.name}: its axes are joints of {machine.mjcf_name}, which is not shown with "
-            "motions beside each other; see that file in MuJoCo's own viewer, and `twin compare`"
-        )
-    spec = machine_spec(replace(machine, axes=bare))
-    if not machine.mjcf:
-        _dress(spec, replay)
+        spec = joints_spec(machine)
+    else:
+        bare = {name: replace(axis, effects=()) for name, axis in machine.axes.items()}
+        # Where a motion is imposed there is no mass, but a body has one.
+        bare = {name: replace(a, mass=a.mass or 1.0) for name, a in bare.items()}
+        spec = machine_spec(replace(machine, axes=bare))
+        if not machine.mjcf:
+            dress(spec, replay)
     looks = spec.visual
     looks.global_.offwidth = max(looks.global_.offwidth, LARGEST)
     looks.global_.offheight = max(looks.global_.offheight, LARGEST)
@@ -103,60 +103,9 @@ def _spec(replay: Replay) -> mujoco.MjSpec:
     return spec
 
 
-def _dress(spec: mujoco.MjSpec, replay: Replay) -> None:
-    """Give plain axes their shapes: a rail with a carriage, or a disc with a hand."""
-    spans = dict(_spans(replay))
-    slides = [high - low for a, (low, high) in spans.items() if not replay.machine.axes[a].rotary]
-    size = max(slides, default=1.0)
-    box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
-
-    def add(body: mujoco.MjsBody, kind: mujoco.mjtGeom, half: list, at: list, rgba: tuple) -> None:
-        shape = body.add_geom(type=kind, rgba=rgba, pos=size * np.array(at), mass=0.0)
-        shape.size[: len(half)] = size * np.array(half)
-
-    for i, (name, (low, high)) in enumerate(spans.items()):
-        frame, body, joint = spec.body(f"frame_{name}"), spec.body(name), spec.joint(name)
-        frame.pos = [0.0, -0.5 * size * i, 0.0]
-        if replay.machine.axes[name].rotary:
-            joint.axis = [0.0, 0.0, 1.0]
-            add(frame, cylinder, [0.10, 0.03], [0, 0, 0.03], DARK)
-            add(body, cylinder, [0.20, 0.02], [0, 0, 0.09], GREY)
-            add(body, box, [0.09, 0.015, 0.012], [0.1, 0, 0.12], BLUE)
-            continue
-        joint.axis = [1.0, 0.0, 0.0]
-        frame.pos[0] = -0.5 * (low + high)
-        middle, half = 0.5 * (low + high) / size, 0.5 * (high - low) / size
-        add(frame, box, [half + 0.16, 0.05, 0.02], [middle, 0, 0.02], DARK)
-        add(body, box, [0.12, 0.09, 0.03], [0, 0, 0.07], GREY)
-        add(body, box, [0.09, 0.06, 0.015], [0, 0, 0.115], BLUE)
-    centre = np.array([0.0, -0.25 * size * (len(spans) - 1), 0.05 * size])
-    spec.stat.center, spec.stat.extent = (
-        centre,
-        size * max(1.2 if slides else 0.6, 0.6 * len(spans)),
-    )
-    spec.worldbody.add_light(pos=[0, 0, 3 * size], dir=[0.2, 0.3, -1], type=1)
-    away = spec.stat.extent * np.array([0.4, -1.5, 1.03])
-    spec.worldbody.add_camera(
-        name="overview", fovy=36, pos=centre + away, xyaxes=[0.967, 0.254, 0, -0.14, 0.534, 0.834]
-    )
-    spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=384,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=[0.5, 0.56, 0.63],
-        rgb2=[0.8, 0.82, 0.85],
-    )  # fmt: skip
-
-
-def _spans(replay: Replay) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Lowest and highest position of each axis: of its travel, or where that is not known, seen."""
-    for name, axis in replay.machine.axes.items():
-        seen = replay.axes[name].measured if name in replay.axes else np.array([0.0, 1.0])
-        low, high = axis.hardware.travel or (seen.min(), seen.max())
-        yield name, (float(low), float(max(high, low + 1e-6)))
-
-
-def _mark(model: mujoco.MjModel, data: mujoco.MjData, axis: str) -> tuple[int, Array]:
-    """The body that an axis moves, and the place in it above an end of its largest shape."""
-    body = int(model.joint(axis).bodyid[0])
+def _mark(model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> tuple[int, Array]:
+    """The body that a joint moves, and the place in it above an end of its largest shape."""
+    body = int(model.joint(joint).bodyid[0])
     own = [i for i in range(model.ngeom) if model.geom_bodyid[i] == body]
     place, top = np.array(data.xpos[body]), -np.inf
     for i in sorted(own, key=lambda i: model.geom_aabb[i][3:].prod()):

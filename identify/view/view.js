@@ -203,10 +203,10 @@ function drawScene() {
   gl.uniform3fv(place("centre"), data.centre);
   gl.uniform1f(place("extent"), data.extent);
   buffers.forEach((b, link) => drawBuffer(b, placed(link, standing.measured), [0, 0, 0, 0]));
-  data.marks.forEach(({ link, at }, i) => {
+  data.marks.forEach(({ axis, link, at }) => {
     const spot = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...at, 1];
     drawBuffer(ball, times(placed(link, standing.measured), spot), [0, 0, 0, 0]);
-    if (Number.isFinite(data.axes[i].setpoint[frame()])) drawBuffer(ball, times(placed(link, standing.setpoint), spot), MARK);
+    if (Number.isFinite(data.axes[axis].setpoint[frame()])) drawBuffer(ball, times(placed(link, standing.setpoint), spot), MARK);
   });
   if (!state.ghost || !data.axes.some((axis) => Number.isFinite(axis.modelled[frame()]))) return;
   gl.enable(gl.POLYGON_OFFSET_FILL); // where the ghost is where the machine is, the machine is seen

@@ -199,8 +199,6 @@ def test_a_model_file_that_is_wrong_is_one_line(folder, old, new, said):
 def test_what_is_not_done_for_joints_is_one_line(folder):
     said = refusal("plan", "arm.toml", "1.mcap", "-o", "next.toml", folder=folder)
     assert "joints of arm.xml, for which no experiment is planned" in said
-    said = refusal("view", "1.mcap", "arm.toml", "--html", "page.html", folder=folder)
-    assert "joints of arm.xml, which is not shown" in said
 
 
 def test_a_log_that_lacks_a_joint_is_one_line(folder):

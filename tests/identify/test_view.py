@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arms import ARM, JOINTS, SAMPLE, arm_log
 from axis_kinds import MACHINES, machine
 from browser import Browser, browser
 from cli_runs import RATE, in_small, process, refusal, twin
@@ -26,7 +27,7 @@ from identify.view.stage import Stage
 from identify.workflow import side_by_side_of
 from twin import load_model, simulate
 from twin.logs import AxisLog, Log, write_log
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 
 BYTES = 3_000_000  # of a page
 MESH = """<mujoco><asset><mesh name="m" vertex="{points}"/></asset><worldbody>
@@ -178,10 +179,28 @@ def test_the_page_moves_in_a_browser(shown, chrome, tmp_path) -> None:
     assert 0.0 < found["played"] <= (len(shown) - 1) / shown.rate
 
 
-@pytest.mark.parametrize("kind", ["proton", "mesh", *MACHINES])
+def jointed(text: str) -> Replay:
+    """An arm's log beside the model of its file."""
+    axes = {joint: AxisModel(0.0, rotary=True, joint=joint) for joint in JOINTS}
+    model = MachineModel("arm", axes, 1.0 / SAMPLE, text, "arm.xml")
+    return replay(model, arm_log(1, duration=2.0), "log")
+
+
+def test_an_arm_whose_shapes_are_not_there_is_drawn_as_rods() -> None:
+    """From joint to joint, however its file describes them."""
+    shapes = ARM.replace("<worldbody>", '<asset><mesh name="m" file="m.stl"/></asset><worldbody>')
+    missing = shapes.replace("</body>", '<geom type="mesh" mesh="m"/></body>', 1)
+    stages = [Stage.of(jointed(text)) for text in (ARM, missing)]
+    for stage in stages:
+        assert [int(n) for n in stage.model.body_geomnum[1:]] == [2, 2, 2]
+    own = ARM.replace("</body>", '<geom size="0.1"/></body>', 1)
+    assert Stage.of(jointed(own)).model.ngeom == 1
+
+
+@pytest.mark.parametrize("kind", ["proton", "mesh", "arm", *MACHINES])
 def test_each_body_of_the_page_is_where_mujoco_has_it(kind, shown, chrome, tmp_path) -> None:
-    if kind == "proton":
-        what = shown
+    if kind in ("proton", "arm"):
+        what = shown if kind == "proton" else jointed(ARM)
     else:
         plain = machine(MACHINES["linear" if kind == "mesh" else kind][0])
         if kind == "mesh":

@@ -22,7 +22,8 @@ pytestmark = pytest.mark.slow
 CATALOGUE = load_catalogue()
 TRAINING, TEST = ("0.25Hz", "0.5Hz"), "1Hz"
 HYSTERETIC = {
-    "dahl", "lugre", "leuven", "modified_leuven", "gms", "cable_hysteresis", "presliding_hysteresis",
+    "dahl", "lugre", "leuven", "modified_leuven", "gms", "cable_hysteresis",
+    "presliding_hysteresis",
 }  # fmt: skip
 MOST_CPU = 60.0  # s of the whole diagnosis
 MAP = """
