@@ -135,7 +135,7 @@ def noisy_force(c: Columns) -> None:
 
 
 def rounded(c: Columns) -> None:
-    c["position"] = np.round(c["position"] / 1e-5) * 1e-5
+    c["position"] = np.round(c["position"] / 2e-5) * 2e-5
 
 
 def in_millimetres(c: Columns) -> None:
@@ -175,7 +175,7 @@ FAULTS: dict[str, tuple[Plant, Fault]] = {
     "swapped forces": (swapped(*DRIVEN), Fault.SWAPPED),
     "samples of the force": (on_x(force_samples), Fault.OUTLIERS),
     "force held 2 samples": (held(2, *DRIVEN), Fault.HELD),
-    "10 um rounding": (on_x(rounded), Fault.COARSE_POSITION),
+    "20 um rounding": (on_x(rounded), Fault.COARSE_POSITION),
     "1 N noise": (on_x(noisy_force), Fault.NOISE),
     "millimetres": (on_x(in_millimetres), Fault.UNIT),
     "a reversed force": (on_x(reversed_force), Fault.SIGN),
