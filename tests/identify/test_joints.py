@@ -262,9 +262,9 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
 @pytest.mark.parametrize(
     ("change", "gain", "body", "motor"),
     [
-        (heavier, 1.0, "upper", None),
+        pytest.param(heavier, 1.0, "upper", None, marks=pytest.mark.slow),
         (lambda _: None, 1.2, None, "shoulder"),
-        (lambda _: None, 1.0, None, None),
+        pytest.param(lambda _: None, 1.0, None, None, marks=pytest.mark.slow),
     ],
 )
 def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(

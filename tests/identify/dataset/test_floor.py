@@ -25,6 +25,7 @@ DRIVES = {
     "every 5th, rounded, current known well": (2e3, 5e-7, 1e-7, 0.0),
     "every 10th": (1e3, 0.0, 1e-7, 2e-3),
 }
+QUICK = ("white", "rounded", "every 5th, rounded", "every 10th")
 
 
 def log_of(name, seed=2, duration=8.0, ripple=0.0):
@@ -38,7 +39,10 @@ def log_of(name, seed=2, duration=8.0, ripple=0.0):
 
 
 @pytest.mark.parametrize("length", [0.1, pytest.param(0.2, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize(
+    "drive",
+    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in DRIVES],
+)
 def test_the_floor_is_what_the_true_model_leaves(drive, length):
     fit = workflow.fit(STAGE, {"log": log_of(drive)}, test_function=length).fits["x"]
     floor = noise_beside(fit.axis, fit.logs)

@@ -27,7 +27,7 @@ from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
 from twin.model.units import Scale, dimension
 
 RATE = 1000.0  # Hz
-UNITS = [(0.01, 1.0), (100.0, 1.0), (1.0, 0.01), (1.0, 100.0), (0.01, 0.01), (100.0, 100.0)]
+UNITS = [(0.01, 1.0), (100.0, 1.0), (1.0, 0.01), (1.0, 100.0)]
 FRICTION = {"Fc": 0.4, "Fs": 0.4, "sigma2": 1.1}
 MASS = 2.3  # kg
 SMALL = 0.03  # N RMS of each effect
@@ -135,7 +135,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_an_absolute_size_is_seen(fault: str) -> None:
     effect = FAULTS[fault]()
-    assert any(differing(effect, *units) for units in UNITS[:4])
+    assert any(differing(effect, *units) for units in UNITS)
 
 
 # --- values at a bound ----------------------------------------------------------------------------

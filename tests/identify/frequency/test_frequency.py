@@ -49,7 +49,7 @@ def test_the_response_is_that_of_the_machine_and_its_band_holds_it(setpoint: Set
 
 
 @pytest.mark.parametrize("setpoint", [multisine, wandering])
-@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.3e-3])
+@pytest.mark.parametrize("delay", [0.0, pytest.param(0.4e-3, marks=pytest.mark.slow), 1.3e-3])
 def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float) -> None:
     machine = replace(MACHINE, delay=delay)
     plant = plant_of(response([recorded(setpoint, machine)]))

@@ -8,7 +8,7 @@ from benchmarks.drives import row
 from benchmarks.second_simulator.drives import Recorder
 
 
-@pytest.mark.parametrize("hidden", ["nothing", "ripple"])
+@pytest.mark.parametrize("hidden", ["nothing", pytest.param("ripple", marks=pytest.mark.slow)])
 def test_noise_of_the_force_is_no_friction_that_grows_with_it(hidden: str) -> None:
     """A servo of 1 kHz logged at 200 Hz: what thinning folds into its force is half of it."""
     found = row("servo", hidden, Recorder(200, 1000), 1)

@@ -176,7 +176,10 @@ def test_ros2_control_has_the_limits_and_a_straight_friction() -> None:
     assert {"cogging", "cable_slab", "asymmetric_friction"} <= {r.part for r in made.lost}
 
 
-@pytest.mark.parametrize("to", ["c", "csv", "twincat", "ros2_control"])
+@pytest.mark.parametrize(
+    "to",
+    ["c", *(pytest.param(n, marks=pytest.mark.slow) for n in ("csv", "twincat", "ros2_control"))],
+)
 def test_an_export_is_told_to_be_that_of_the_model_or_of_one_before(tmp_path, to) -> None:
     model = MachineModel("drive", {"x": AxisModel(2.0, HARDWARE, PLAIN)}, 1000.0)
     save_model(model, tmp_path / "m.toml")
