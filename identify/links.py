@@ -42,6 +42,7 @@ from twin.signals import Array
 if TYPE_CHECKING:
     from twin.mujoco.mechanism import Mechanism
 
+LINK_MASS = "link_mass"  # by which `twin add` knows it, as it knows an effect by its name
 INERTIAL = {
     "mass": "kg", "first moment x": "kg m", "first moment y": "kg m", "first moment z": "kg m",
     "inertia xx": "kg m^2", "inertia yy": "kg m^2", "inertia zz": "kg m^2",
@@ -55,13 +56,15 @@ SURE = NormalDist().inv_cdf(0.95)  # standard deviations of half a 90 % band
 class WrongBody:
     """A body whose inertial parameters are not those of the file.
 
-    body: its name; level: names of others that explain as much. axes: whose forces it changes.
+    body: its name; axis: that moves it. level: names of others that explain as much. axes: whose
+    forces it changes.
     inertial, change, band (10,): each of INERTIAL as the file has it, by how much it is more, and
     half the 90 % band of that; no number where the logs do not tell it. score: over all joints.
     errors: N, of each axis without and with it. datasets, fits: with it as it was found, by axis.
     """
 
     body: str
+    axis: str
     level: tuple[str, ...]
     axes: tuple[str, ...]
     inertial: Array
@@ -191,6 +194,7 @@ def _accepted(
     refits = {a: _refitted(fits[a], d) for a, d in found.items()}
     return WrongBody(
         body=body.name,
+        axis=body.mechanism.axes[body.index],
         level=tuple(r.name for r in rivals if is_level(r)),
         axes=tuple(axis for axis in body.axes if axis in fits),
         inertial=body.mechanism.inertial(body.index),
@@ -201,6 +205,20 @@ def _accepted(
         datasets=found,
         fits=refits,
     )
+
+
+def corrected(model: MachineModel, found: WrongBody, element: str, file: str) -> MachineModel:
+    """A model with that inertial element in a MuJoCo file of another name, its joints refitted."""
+    from twin.mujoco.mechanism import joints_of
+    from twin.mujoco.written import in_mjcf, with_inertial
+
+    text, name, wanted = model.mjcf or "", model.mjcf_name or "", found.inertial + found.change
+    text = in_mjcf(text, name)
+    text = with_inertial(text, name, model.joints, found.axis, element, wanted)
+    bodies = joints_of(text, file, model.joints)
+    refitted = {axis: fit.axis for axis, fit in found.fits.items()}
+    axes = {a: replace(refitted.get(a, x), mass=bodies[a].inertia) for a, x in model.axes.items()}
+    return replace(model, axes=axes, mjcf=text, mjcf_name=file, intervals={})
 
 
 def is_better(with_body: Mapping[str, AxisDiagnosis], without: Mapping[str, AxisDiagnosis]) -> bool:

@@ -29,11 +29,11 @@ from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
-from identify.links import is_better, suspects_of
+from identify.links import corrected, is_better, suspects_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.output.words.addition import axis_in_words, notes_in_words
-from identify.results.addition import Addition, addition
+from identify.results.addition import Addition, CorrectedBody, addition
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     AxisSummary,
@@ -60,6 +60,7 @@ from twin.logs import GivenLogs, Log, logs_by_name
 from twin.memory import trim_memory
 from twin.model.file import as_model
 from twin.model.machine import MachineModel
+from twin.mujoco.inertial import inertial
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
 
@@ -318,6 +319,43 @@ def add(
     having = [n for n in names if n not in open_axes]
     made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
     return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
+
+
+@parallel()
+def correct_body(
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    file: str,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> CorrectedBody:
+    """The inertia that a body has by the logs, written into a copy of the machine's MuJoCo file.
+
+    file: name of the copy. Raises InputError where the axes are no joints, where the logs prove no
+    body to be another than in the file, and where no body can have the inertia found.
+    """
+    model = as_model(model)
+    if not model.joints:
+        raise InputError(
+            f"{model.name}: link_mass corrects a body of a MuJoCo file, and its axes are no joints "
+            "of one; add payload_mass, or begin with `twin new LOG --mjcf robot.xml`"
+        )
+    before = fit(
+        physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
+    )
+    progress("bodies", 0, 1)
+    found = suspects_of(before.model, before.fits, before.datasets).body
+    if found is None or found.element is None:
+        what = "prove no body" if found is None else f"tell too little of body {found.body}"
+        raise InputError(
+            f"{model.mjcf_name}: the logs {what} to correct it; `twin diagnose` says what they show"
+        )
+    element = inertial(*found.element)
+    made = corrected(before.model, found, element, file)
+    return CorrectedBody(made, before.model, found, element)
 
 
 def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:

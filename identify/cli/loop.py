@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from functools import partial
@@ -38,6 +38,7 @@ from twin.errors import InputError
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.commands import Source
+    from identify.results.addition import Addition, CorrectedBody
     from identify.results.results import Comparison, Diagnosis, FitResult, OnMachine, SimulationFit
     from twin.effects import Catalogue
     from twin.model.machine import MachineModel
@@ -205,17 +206,39 @@ def add(
 ) -> Said:
     """Add an effect, or the shape of one, refit, and record the error before and after.
 
+    Of a machine of joints, link_mass corrects a body: it is written into a copy of the MuJoCo file.
+
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
     from identify import workflow
+    from identify.links import LINK_MASS
+    from twin.files import write_atomically
     from twin.model.file import save_model
 
     machine, catalogue = loaded(model, effects)
-    made = workflow.add_shape if shape else workflow.add
-    job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
+    job: Callable[..., Addition | CorrectedBody]
+    result: Addition | CorrectedBody
+    if file := _copy_of(machine, out) if effect == LINK_MASS else None:
+        job = partial(workflow.correct_body, file=file.name, test_function=test_function)
+    else:
+        made = workflow.add_shape if shape else workflow.add
+        job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
     result, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
+    if file:
+        write_atomically(file, (result.model.mjcf or "").encode())
     save_model(result.model, out)
     return said_of(result, [*findings, *silent], result.kept, left_out=silent)
+
+
+def _copy_of(machine: MachineModel, out: Path) -> Path:
+    """The MuJoCo file beside a model that is written; InputError where it is the user's own."""
+    file = out.with_suffix(".xml")
+    if file.name == machine.mjcf_name:
+        raise InputError(
+            f"--out {out}: its MuJoCo file would be {file.name}, which is the one that is to be "
+            "corrected; give another name"
+        )
+    return file
 
 
 @app.command()

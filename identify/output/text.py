@@ -10,7 +10,7 @@ from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity
 from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
-from identify.output.words.body import body_in_words
+from identify.output.words.body import body_in_words, corrected_in_words
 from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import (
     all_found,
@@ -43,7 +43,7 @@ from identify.output.words.plan import (
 )
 from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
-from identify.results.addition import Addition
+from identify.results.addition import Addition, CorrectedBody
 from identify.results.results import (
     AxisSummary,
     Comparison,
@@ -166,7 +166,7 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
 
     source: what stands for MODEL in the next command.
     """
-    lines = body_in_words(result)
+    lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
     for axis, d in result.axes.items():
         said, words = said_of(result, axis), d.base.axis.units.words
@@ -254,6 +254,13 @@ def add_text(result: Addition) -> str:
     if not result.kept:
         lines.append(f"  {proved_in_words(result)}")
     return "\n".join(lines)
+
+
+@text_of.register
+def corrected_text(result: CorrectedBody) -> str:
+    """What was written into the MuJoCo file, and the errors before and after."""
+    first, *others = corrected_in_words(result)
+    return "\n".join([first, *(f"  {line}" for line in others)])
 
 
 @text_of.register

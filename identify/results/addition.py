@@ -9,6 +9,7 @@ from identify.dataset.dataset import Dataset, Role, by_log
 from identify.estimation.confounded import MovedParameter, moved_parameters
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.links import WrongBody
 from identify.results import Printed
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
@@ -63,6 +64,21 @@ class Addition(Printed):
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CorrectedBody(Printed):
+    """A model whose MuJoCo file has the inertia of a body as the logs show it.
+
+    given: the model before, fitted. body: what the logs show of it, with the errors of each joint.
+    element: what was written. kept: as the logs prove it; else nothing is written.
+    """
+
+    model: MachineModel
+    given: MachineModel
+    body: WrongBody
+    element: str
+    kept: bool = True
 
 
 def addition(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, arm_of, friction
 from cli_runs import refusal, twin
+from strict_json import valid
 
 from identify.analysis.joint_signs import misassigned
 from identify.estimation.open_loop import open_loop
@@ -249,14 +251,28 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     told = text_of(found)
     assert told.startswith("The inertia of body fore is not as arm.xml has it (confidence 99 %)")
     assert answer_of(found).entries()["body"]["parameters"]["mass"]["unit"] == "kg"
-    # What is said, written into the file, leaves nothing to be said.
+    # The next command writes what is said into a copy of the file; then nothing is to be said.
     (element,) = re.findall("<inertial .*?/>", told)
+    assert "Next: twin add link_mass MODEL a --holdout b -o corrected.toml writes <inertial" in told
+    for name in ("arm.toml", "arm.xml"):
+        shutil.copy(folder / name, tmp_path)
+    for name, log in zip("ab", logs, strict=True):
+        write_log(log, tmp_path / f"{name}.mcap")
+    add = ("add", "link_mass", "arm.toml", "a.mcap", "--holdout", "b.mcap", "-o")
+    assert "is the one that is to be corrected" in refusal(*add, "arm.toml", folder=tmp_path)
+    done = twin(*add, "corrected.toml", "--json", folder=tmp_path)
+    answer = valid(json.loads(done.stdout))
+    assert (answer["body"], answer["mujoco"], answer["element"]) == (
+        "fore", "corrected.xml", element,
+    )  # fmt: skip
     old = '<inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>'
-    (tmp_path / "arm.xml").write_text(ARM.replace(old, element))
-    shutil.copy(folder / "arm.toml", tmp_path)
-    again = diagnose(tmp_path / "arm.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
+    assert (tmp_path / "corrected.xml").read_text() == ARM.replace(old, element)
+    assert (tmp_path / "arm.xml").read_text() == ARM
+    again = diagnose(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
     assert again.body is None
     assert not any(d.findings for d in again.axes.values())
+    said = refusal("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
+    assert "the logs prove no body to correct it" in said
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from identify.output.words.diagnosis import (
 )
 from identify.output.words.findings import advice, pairs_in_words
 from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
-from identify.results.addition import Addition
+from identify.results.addition import Addition, CorrectedBody
 from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
@@ -34,6 +34,7 @@ from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
 from twin.experiments.file import parameters
 from twin.experiments.kinds import kind_of
+from twin.model.machine import MachineModel
 
 # --- planned experiments ---------------------------------------------------------------------
 
@@ -393,6 +394,22 @@ class BodyEntry(Entry):
     errors: dict[str, ErrorsEntry]
 
 
+class BodyAnswer(Answer, BodyEntry):
+    """What `twin add link_mass` prints: the body that was corrected, and what was written."""
+
+    element: str
+    mujoco: str
+    """The file that has it."""
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: CorrectedBody, **more: Any) -> BodyAnswer:
+    own = _of_body(result.body, result.given)
+    file = result.model.mjcf_name
+    return BodyAnswer.of(result.body, element=result.element, mujoco=file, **own, **more)
+
+
 class DiagnosisAnswer(Answer, DiagnosisEntry):
     """What `twin diagnose` prints: the axis that the answer is about, and the same by axis."""
 
@@ -408,20 +425,22 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
     leading = axes[result.leading.dataset.axis]
-    body = result.body and _body(result.body, result)
+    own = result.body
+    body = own and BodyEntry.of(own, **_of_body(own, result.model))
     return DiagnosisAnswer.of(leading, axes=axes, body=body, **more)
 
 
-def _body(found: WrongBody, result: Diagnosis) -> BodyEntry:
+def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:
+    """Its parameters and errors, with their units."""
     told = {
         name: InertialEntry(more=value, band_90=band, unit=INERTIAL[name])
         for name, (value, band) in found.told.items()
     }
     errors = {
-        axis: ErrorsEntry.of(own, unit=result.model.axes[axis].units.force)
+        axis: ErrorsEntry.of(own, unit=model.axes[axis].units.force)
         for axis, own in found.errors.items()
     }
-    return BodyEntry.of(found, parameters=told, errors=errors)
+    return {"parameters": told, "errors": errors}
 
 
 def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:

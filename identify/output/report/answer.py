@@ -9,6 +9,7 @@ from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.addition import also_chose_in_words, errors_of_step, proved_in_words
 from identify.output.words.body import body_in_words
+from identify.output.words.commands import Source
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
@@ -28,14 +29,14 @@ def cards(view: AxisView) -> list[Block]:
     if diagnosis and view.found and view.summary and view.said:
         first = diagnosis.body if view.name == view.subject.views[0].name else None
         own = _diagnosed(view, diagnosis, view.found, view.summary, view.said)
-        return [*([_body(diagnosis, first)] if first else []), own]
+        return [*([_body(diagnosis, first, view.subject.source)] if first else []), own]
     added = [a for a in view.subject.additions if a.step.axis == view.name]
     return [*(_added(a) for a in added[-1:]), _compared(view)]
 
 
-def _body(diagnosis: Diagnosis, body: WrongBody) -> Answer:
+def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> Answer:
     """The card of a body whose inertia is not that of its file."""
-    sentence, *others = body_in_words(diagnosis)
+    sentence, *others = body_in_words(diagnosis, source)
     axes = diagnosis.model.axes
     tiles = [
         Tile(

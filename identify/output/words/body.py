@@ -2,17 +2,45 @@
 
 from __future__ import annotations
 
-from identify.links import INERTIAL, WrongBody
+from identify.links import INERTIAL, LINK_MASS, WrongBody
 from identify.output.numbers import arrow, listed, percent, with_band
+from identify.output.words.commands import UNKNOWN, Source, names_of
+from identify.results.addition import CorrectedBody
 from identify.results.results import Diagnosis
+from twin.model.machine import MachineModel
+from twin.mujoco.inertial import inertial
 
 
-def body_in_words(result: Diagnosis) -> list[str]:
-    """What is said of the body; nothing where there is none."""
+def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
+    """What is said of the body, and the next command; nothing where there is none."""
     found = result.body
     if found is None:
         return []
-    file, name = result.model.mjcf_name, " or ".join((found.body, *found.level))
+    said, file = wrong_body_in_words(found, result.model), result.model.mjcf_name
+    if found.element is None:
+        return [*said, f"Next: change the body in {file}, then fit again."]
+    command = f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
+    dataset = result.axes[next(iter(result.axes))].dataset
+    said.append(
+        f"Next: {source.filled(command, names_of(dataset))} writes {inertial(*found.element)} into "
+        f"the body, in a copy of {file}."
+    )
+    return said
+
+
+def corrected_in_words(result: CorrectedBody) -> list[str]:
+    """What was written, why, and what it did to the errors."""
+    found, written = result.body, result.model.mjcf_name
+    return [
+        f"Body {found.body} of {written} has {result.element}; {result.given.mjcf_name} is as it "
+        "was.",
+        *wrong_body_in_words(found, result.given),
+    ]
+
+
+def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
+    """That a body is not as its file has it, by how much, and the errors without and with it."""
+    file, name = model.mjcf_name, " or ".join((found.body, *found.level))
     score = found.score
     said = [
         f"The inertia of body {name} is not as {file} has it (confidence "
@@ -24,24 +52,13 @@ def body_in_words(result: Diagnosis) -> list[str]:
     if found.untold:
         said.append(f"These joints do not tell its {listed(found.untold)}.")
     errors = [
-        f"{axis} {arrow(e.before, e.after, result.model.axes[axis].units.force)}"
+        f"{axis} {arrow(e.before, e.after, model.axes[axis].units.force)}"
         for axis, e in found.errors.items()
         if axis in found.axes
     ]
     on = found.errors[found.axes[0]].on.value
     said.append(f"Error on the {on} logs without and with it: {', '.join(errors)}.")
-    said.append(f"Next: change the body in {file}{_element(found)}, then fit again.")
     return said
-
-
-def _element(found: WrongBody) -> str:
-    """E.g. ": <inertial mass=... />"; nothing where no body can have what was found."""
-    if found.element is None:
-        return ""
-    mass, centre, inertia = found.element
-    full = [*inertia.diagonal(), *inertia[[0, 0, 1], [1, 2, 2]]]
-    pos, fullinertia = (" ".join(f"{v:.5g}" for v in values) for values in (centre, full))
-    return f': <inertial mass="{mass:.5g}" pos="{pos}" fullinertia="{fullinertia}"/>'
 
 
 def _parameters(found: WrongBody) -> str:

@@ -9,7 +9,6 @@ they lose of an effect is told along logs: the force that it makes in the model 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -21,15 +20,15 @@ from twin.errors import InputError
 from twin.export import Exported, Exporter, Remark
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel, axis_table
-from twin.mujoco.mechanism import PASSIVE, read_bodies
+from twin.mujoco.mechanism import PASSIVE
 from twin.mujoco.mjcf import read_spec
+from twin.mujoco.written import in_mjcf, with_joint
 from twin.signals import Array, between
 
 Attributes = Mapping[str, float]
 KEPT = 0.01  # least part of an effect's force that is told to be lost
 HALF = 0.5  # where more is lost than held, the effect is called lost
 SWING, SAMPLE = 10.0, 1e-3  # s, of the sine over the travel on which losses are told without a log
-_JOINT = re.compile(r"<!--.*?-->|<joint\b(?:[^>\"']|\"[^\"]*\"|'[^']*')*>", re.DOTALL)
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
@@ -40,7 +39,7 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
             "or begin with `twin new LOG --mjcf robot.xml`"
         )
     name = model.mjcf_name or "model.xml"
-    text = _in_mjcf(model.mjcf, name)
+    text = in_mjcf(model.mjcf, name)
     for axis, own in model.axes.items():
         text = _with_attributes(text, name, axis, own)
     judged = {axis: _judged(model, axis, logs) for axis in model.axes}
@@ -50,15 +49,6 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
         tuple(r for _, nearly, _ in judged.values() for r in nearly),
         tuple(r for _, _, lost in judged.values() for r in lost),
     )
-
-
-def _in_mjcf(text: str, name: str) -> str:
-    """The text itself, or what a URDF text is in MJCF."""
-    if "<mujoco" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).lstrip()[:200]:
-        return text
-    spec = read_bodies(text, name)
-    spec.compile()
-    return str(spec.to_xml())
 
 
 def attributes_of(axis: AxisModel) -> dict[str, float]:
@@ -87,22 +77,7 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     if "springref" in wanted:
         in_degrees = spec.compiler.degree and own.rotary
         new["springref"] = np.degrees(wanted["springref"]) if in_degrees else wanted["springref"]
-
-    def changed(found: re.Match[str]) -> str:
-        tag = found[0]
-        named = re.search(r"\sname\s*=\s*[\"']([^\"']*)[\"']", tag)
-        if tag.startswith("<!--") or named is None or named[1] != joint:
-            return tag
-        if re.search(r"\sjoint1\s*=", tag):  # an equality constraint of that name
-            return tag
-        for key, value in new.items():
-            own_text, pattern = f'{key}="{value:.9g}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
-            tag, count = re.subn(pattern, own_text, tag)
-            if not count:
-                tag = re.sub(r"\s*(/?>)$", rf" {own_text}\1", tag)
-        return tag
-
-    return _JOINT.sub(changed, text)
+    return with_joint(text, joint, new)
 
 
 def _judged(

@@ -1,0 +1,98 @@
+"""The user's MuJoCo file with something changed in it; its order and comments stay as they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.errors import InputError
+from twin.mujoco.mechanism import mechanism_of, read_bodies
+from twin.signals import Array
+
+_TAG = re.compile(
+    r"<!--.*?-->|<(?P<end>/?)(?P<kind>[\w:.-]+)(?:[^>\"']|\"[^\"]*\"|'[^']*')*>", re.DOTALL
+)
+ACCURACY = 1e-4  # relative, to which the file holds what is written into it
+
+
+def in_mjcf(text: str, name: str) -> str:
+    """The text itself, or what a URDF text is in MJCF."""
+    if "<mujoco" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).lstrip()[:200]:
+        return text
+    spec = read_bodies(text, name)
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def with_joint(text: str, joint: str, attributes: Mapping[str, float]) -> str:
+    """An MJCF text with these attributes of the joint of that name."""
+
+    def changed(found: re.Match[str]) -> str:
+        tag = found[0]
+        # An equality constraint of that name is a joint as well, by its tag.
+        if found["kind"] != "joint" or _named(tag) != joint or re.search(r"\sjoint1\s*=", tag):
+            return tag
+        for key, value in attributes.items():
+            own, pattern = f'{key}="{value:.9g}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
+            tag, count = re.subn(pattern, own, tag)
+            if not count:
+                tag = re.sub(r"\s*(/?>)$", rf" {own}\1", tag)
+        return tag
+
+    return _TAG.sub(changed, text)
+
+
+def with_inertial(
+    text: str, name: str, joints: Mapping[str, str], axis: str, element: str, wanted: Array
+) -> str:
+    """An MJCF text with this inertial element in the body that an axis moves.
+
+    name: of the file, for messages. joints: of all axes. wanted (10,): the body's parameters, as
+    ``Mechanism.inertial`` has them. Raises InputError where the file takes them from elsewhere.
+    """
+    place = _place_of(text, joints[axis])
+    made = text if place is None else text[: place[0]] + element + text[place[1] :]
+    mechanism = mechanism_of(made, name, joints)
+    has = mechanism.inertial(mechanism.axes.index(axis))
+    if not np.allclose(has, wanted, rtol=ACCURACY, atol=ACCURACY * np.abs(wanted).max()):
+        raise InputError(
+            f"{name}: the body of joint '{joints[axis]}' does not take its inertia from an "
+            f"inertial element in it; write {element} where its inertia is made"
+        )
+    return made
+
+
+@dataclass
+class _Open:
+    """A body that a text is within: where its content begins, its own inertial element, joints."""
+
+    begin: int
+    own: tuple[int, int] | None
+    joints: list[str | None]
+
+
+def _place_of(text: str, joint: str) -> tuple[int, int] | None:
+    """Where the inertial element of the body of that joint is, or belongs; None without a body."""
+    within = [_Open(0, None, [])]
+    for found in _TAG.finditer(text):
+        kind, closes = found["kind"], found["end"] or found[0].endswith("/>")
+        if kind == "body" and not closes:
+            within.append(_Open(found.end(), None, []))
+        elif kind == "body" and found["end"]:
+            body = within.pop()
+            if joint in body.joints:
+                return body.own or (body.begin, body.begin)
+        elif kind == "joint" and not found["end"]:
+            within[-1].joints.append(_named(found[0]))
+        elif kind == "inertial":
+            begin = within[-1].own[0] if found["end"] and within[-1].own else found.start()
+            within[-1].own = (begin, found.end())
+    return None
+
+
+def _named(tag: str) -> str | None:
+    found = re.search(r"\sname\s*=\s*[\"']([^\"']*)[\"']", tag)
+    return found[1] if found else None
