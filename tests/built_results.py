@@ -220,8 +220,8 @@ def wrong_body() -> WrongBody:
     inertial = np.array([2.0, 0.3, 0.0, 0.0, 0.02, 0.08, 0.08, 0.0, 0.0, 0.0])
     errors = {"x": errors_of(0.56, 0.0022), "y": errors_of(3.16, 0.02)}
     return WrongBody(
-        "fore", ("upper",), ("x", "y"), inertial, change, band, score_of(0.98, 14.0, 0.3), errors,
-        {}, {},
+        "fore", "y", ("upper",), ("x", "y"), inertial, change, band, score_of(0.98, 14.0, 0.3),
+        errors, {}, {},
     )  # fmt: skip
 
 

@@ -26,6 +26,7 @@ from identify.output.answers.answer import Answer, plain
 from identify.output.answers.machine import check_answer, effect_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
+from identify.results.addition import CorrectedBody
 from identify.selection.diagnosis import Verdict
 from identify.selection.found_shape import Drawn, FoundShape
 from identify.selection.free_exponent import FreeExponent
@@ -99,6 +100,9 @@ ANSWERS: dict[str, Callable[[], object]] = {
         refits={}, next_experiments={}, not_planned={"x": "no travel"}
     ),
     "diagnosis: another body": lambda: replace(made.diagnosed(), body=made.wrong_body()),
+    "corrected body": lambda: CorrectedBody(
+        made.diagnosed().model, made.diagnosed().model, made.wrong_body(), "<inertial/>"
+    ),
     **{f"effect {n}": lambda n=n: effect_answer(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
     "laws": laws,
     "check": check,
