@@ -101,7 +101,8 @@ ANSWERS: dict[str, Callable[[], object]] = {
     ),
     "diagnosis: another body": lambda: replace(made.diagnosed(), body=made.wrong_body()),
     "corrected body": lambda: CorrectedBody(
-        made.diagnosed().model, made.diagnosed().model, made.wrong_body(), "<inertial/>"
+        replace(made.diagnosed().model, mjcf_name="b.xml"), made.diagnosed().model,
+        made.wrong_body(), "<inertial/>",
     ),
     **{f"effect {n}": lambda n=n: effect_answer(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
     "laws": laws,
