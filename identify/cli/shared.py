@@ -106,9 +106,11 @@ class Recordings(Mapping[str, "Log"]):
         self.every = step_of(among or paths) if paths else 1
 
     def __getitem__(self, name: str) -> Log:
+        from twin.checks.long import is_thinned
+
         path = self.paths[name]
         log = self.read(path)
-        if self.every > 1:
+        if self.every > 1 and is_thinned(log, path):
             print(
                 f"twin: {path}: is read at {log.sample_rate:g} Hz, because all logs together are "
                 "too long to be held in memory; cut them to be fitted at their own rate",

@@ -175,6 +175,11 @@ class Axis:
         force = self.force[span.start + shift : span.stop + shift]
         return fit_dynamics(force, self.regressors[span], self.kept[span], span.start)
 
+    def span(self, rows: slice) -> Array:
+        """Orthonormal basis (r, k) of what its motion can explain, at some of the samples."""
+        used = self.regressors[rows] * self.kept[rows, None]
+        return np.linalg.qr(used / (np.linalg.norm(used, axis=0) + np.finfo(float).tiny))[0]
+
     @cached_property
     def regressors(self) -> Array:
         """(m, 5) regressors of a command: mass, damping, Coulomb friction, bias, stiffness."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -202,9 +201,15 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
 
 
 def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
-    """Swapped positions or forces, for each pair of axes that move."""
-    for one, other in combinations([a for a in axes if a.moves], 2):
-        if len(one.force) != len(other.force) or one.log.kind != other.log.kind:
+    """Swapped positions or forces, for each pair of axes that move.
+
+    Of many axes only pairs are asked each of whose motions explains the other's force best.
+    """
+    moving = [a for a in axes if a.moves]
+    others = [_explained_by(one, moving) for one in moving]
+    for one, other in zip(moving, others, strict=True):
+        first = other is not None and moving.index(one) < moving.index(other)
+        if other is None or not first or others[moving.index(other)] is not one:
             continue
         own = min(_left(one, one), _left(other, other))
         crossed = max(_left(one, other), _left(other, one))
@@ -217,6 +222,17 @@ def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
             f"its own {100 * own:.2g} %: {what} of axes {one.name} and {other.name} are swapped",
             f"exchange the columns of the {what} of both axes in the import map",
         )
+
+
+def _explained_by(one: Axis, axes: Sequence[Axis]) -> Axis | None:
+    """The other axis whose motion leaves least of this force by least squares, if any can."""
+    others = [a for a in axes if a is not one and a.log.kind == one.log.kind]
+    others = [a for a in others if len(a.force) == len(one.force)]
+    if len(others) < 2:
+        return next(iter(others), None)
+    rows = slice(None, None, -(-len(one.force) // limits.ROWS_OF_A_GLANCE))
+    explained = [float(np.linalg.norm(a.span(rows).T @ one.force[rows])) for a in others]
+    return others[int(np.argmax(explained))]
 
 
 def _left(force: Axis, motion: Axis) -> float:

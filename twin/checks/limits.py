@@ -110,6 +110,7 @@ LOOKS_LIKE = 0.3  # of the logarithm: how near to a known slip of units a ratio 
 RELATED = 0.9  # correlation of two signals that state the same
 WORSE = 1.2  # times what the motion of the other axis leaves of a force, its own leaves
 EXPLAINED_CROSSED = 0.6  # largest part that the motion of the other axis leaves
+ROWS_OF_A_GLANCE = 4000  # of a force, enough to tell which of many motions explains it best
 ALIKE_SETPOINT = 0.98  # correlation of a position and the setpoint that it follows
 
 # What a fit needs

@@ -88,6 +88,11 @@ def read_measured(path: Path, fields: Sequence[str], every: int = 1) -> Log:
     return joined(_thinned(parts, every))
 
 
+def is_thinned(log: Log, path: Path) -> bool:
+    """Whether a log that was read of a file has fewer of its samples than it has."""
+    return 1.5 * len(log) < max(samples_by_axis(path).values())  # of two samples one at most
+
+
 def step_of(paths: Iterable[Path]) -> int:
     """Of how many samples one is read, so that all these logs fit into memory together."""
     total = sum(sum(samples_by_axis(path).values()) for path in paths)

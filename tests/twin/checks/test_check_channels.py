@@ -143,8 +143,11 @@ def test_a_channel_that_is_late_is_told_with_the_remedy(rate, name, late, severi
 # Swapped axes
 
 
+@pytest.mark.parametrize("beside", [0, 4])
 @pytest.mark.parametrize("what", ["force", "position"])
-def test_channels_that_are_swapped_are_told_by_what_was(what):
+def test_channels_that_are_swapped_are_told_by_what_was(what, beside):
+    """And no pair of other axes with them."""
+
     def found(*names, kind=LINEAR_UNITS):
         t = 10.0 + np.arange(4000) / RATE
         s = 1.7 * t + 3.0
@@ -155,7 +158,12 @@ def test_channels_that_are_swapped_are_told_by_what_was(what):
         one["setpoint_position"] = motion(t)
         for name in names:
             one[name], other[name] = other[name], one[name]
-        axes = {"a": AxisLog(one), "b": AxisLog(other, kind)}
+        sound = {}
+        for k in range(beside):
+            rate = 1.13 + 0.17 * k
+            s = rate * t + k
+            sound[f"s{k}"] = AxisLog({"position": motion(s), "force": rate**2 * motion(s, 2)})
+        axes = {**sound, "a": AxisLog(one), "b": AxisLog(other, kind)}
         return findings(Log(RATE, axes), Fault.SWAPPED)
 
     assert found() == []

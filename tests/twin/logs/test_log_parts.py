@@ -14,7 +14,7 @@ from mcap.records import ChunkIndex
 from mcap_bytes import of, parsed
 
 from twin.checks import check_log
-from twin.checks.long import check_file, read_checked, read_measured
+from twin.checks.long import check_file, is_thinned, read_checked, read_measured
 from twin.errors import InputError
 from twin.logs import AxisLog, Log, read_log, write_log
 from twin.logs.decode import read_parts
@@ -151,6 +151,7 @@ def test_a_file_is_checked_as_its_log_is_and_read_at_a_lower_rate(tmp_path):
         got, again = read_checked(tmp_path / "a.mcap", fields, every)
         assert again == report
         assert_same_samples(got, wanted)
+        assert is_thinned(got, tmp_path / "a.mcap") is (step > 1)
         assert_same_samples(read_measured(tmp_path / "a.mcap", fields, every), wanted)
 
 
