@@ -37,6 +37,7 @@ from identify.selection.trying import NEARLY_ALL
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import MachineModel
+from twin.progress import Progress, silent
 from twin.signals import Array
 
 if TYPE_CHECKING:
@@ -136,7 +137,10 @@ def _is_gain(effect: Effect) -> bool:
 
 
 def suspects_of(
-    model: MachineModel, fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]
+    model: MachineModel,
+    fits: Mapping[str, Fit],
+    datasets: Mapping[str, Dataset],
+    progress: Progress = silent,
 ) -> Suspects:
     """The body or the motor that explains what the joints' models leave, where there is one.
 
@@ -156,7 +160,8 @@ def suspects_of(
     rivals: list[_Body | _Motor] = [*bodies, *map(_Motor, left)]
     trial = _Trial.beside(before)
     parts = []
-    for rival in rivals:
+    for i, rival in enumerate(rivals):
+        progress("trying bodies and motors", i, len(rivals))
         parts.append(trial.part(rival))
         rival.forget()
     first, *others = (rivals[i] for i in np.argsort(parts)[::-1])

@@ -223,7 +223,7 @@ def diagnose(
     result = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    suspects = suspects_of(result.model, result.fits, result.datasets)
+    suspects = suspects_of(result.model, result.fits, result.datasets, progress)
     offered = {axis: suspects.offered(known, axis) for axis in result.fits}
     body = suspects.body
     if body is None or not body.explains_all:
@@ -346,8 +346,7 @@ def correct_body(
     before = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    progress("bodies", 0, 1)
-    found = suspects_of(before.model, before.fits, before.datasets).body
+    found = suspects_of(before.model, before.fits, before.datasets, progress).body
     if found is None or found.element is None:
         what = "prove no body" if found is None else f"tell too little of body {found.body}"
         raise InputError(
