@@ -7,7 +7,10 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
+
+from typer.main import get_command
 
 from identify.cli import doctor, loop, machine
 from identify.cli.shared import app
@@ -46,7 +49,7 @@ def main() -> None:
     gc.set_threshold(OBJECTS)
     try:
         _require_no_empty(sys.argv[1:])
-        code = app(sys.argv[1:] or ["--help"], prog_name="twin", standalone_mode=False)
+        code = _command()(sys.argv[1:] or ["--help"], prog_name="twin", standalone_mode=False)
         if code == INTERRUPTED:
             raise KeyboardInterrupt
     except InputError as error:
@@ -70,6 +73,12 @@ def main() -> None:
             )
     gc.freeze()  # all of it ends with the process: to seek cycles before takes as long as to load
     sys.exit(code if isinstance(code, int) else 0)
+
+
+@cache
+def _command() -> Any:
+    """All commands as one: reading their signatures takes longer than many a command."""
+    return get_command(app)
 
 
 def _require_no_empty(arguments: Sequence[str]) -> None:

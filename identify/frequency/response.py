@@ -199,8 +199,6 @@ def _repeats_after(signal: Array) -> int:
 
 def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> Response:
     """Responses of several logs as one, each weighed by its variance."""
-    from scipy.stats import f as fisher  # takes a while to load
-
     plant, closed = np.zeros((2, len(grid)), dtype=complex)
     spread, noise, coherence, band = np.zeros((4, len(grid)))
     for k, at in enumerate(zip(*found, strict=True)):
@@ -215,7 +213,8 @@ def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> 
         closed[k] = sum(w * one.mean[1] for w, one in zip(weight, at, strict=True))
         coherence[k] = sum(w * one.explained.min() for w, one in zip(weight, at, strict=True))
         freedom = sum(one.freedom for one in at)
-        band[k] = spread[k] * np.sqrt(fisher.ppf(0.9, 2, 2 * freedom))
+        # The 90 % quantile of Fisher's F of 2 and 2 freedom degrees, in closed form.
+        band[k] = spread[k] * np.sqrt(freedom * (0.1 ** (-1.0 / freedom) - 1.0))
     return Response(grid, plant, spread, noise, closed, coherence, band, period)
 
 

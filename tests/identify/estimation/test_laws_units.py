@@ -27,7 +27,7 @@ from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
 from twin.model.units import Scale, dimension
 
 RATE = 1000.0  # Hz
-UNITS = [(0.01, 1.0), (100.0, 1.0), (1.0, 0.01), (1.0, 100.0)]
+UNITS = [(0.01, 1.0), (1.0, 100.0)]
 FRICTION = {"Fc": 0.4, "Fs": 0.4, "sigma2": 1.1}
 MASS = 2.3  # kg
 SMALL = 0.03  # N RMS of each effect

@@ -190,7 +190,7 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     assert head.startswith("axis,source,frequency (Hz),real (m/N)")
     assert len(lines) > 50
     assert picture.read_bytes()[:4] == b"\x89PNG"
-    twin("frf", log, "-o", "r.mcap", folder=tmp_path)
+    answer = twin("frf", log, "-o", "r.mcap", "--json", folder=tmp_path)
     with (tmp_path / "r.mcap").open("rb") as stream:
         ((schema, channel, message),) = make_reader(stream).iter_messages()
     assert channel.topic == "/x/frequency_response/measured"
@@ -198,7 +198,6 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     real = [float(line.split(",")[3]) for line in lines]
     np.testing.assert_allclose(json.loads(message.data)["real"], real, rtol=1e-8)
     assert "end the name in .csv or .mcap" in refusal("frf", log, "-o", "r.txt", folder=tmp_path)
-    answer = twin("frf", log, "--json", folder=tmp_path)
     assert "end the name in .png" in refusal("frf", log, "--plot", "b.xyz", folder=tmp_path)
     plant = json.loads(answer.stdout)["axes"]["x"]["measured"]["plant"]
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)

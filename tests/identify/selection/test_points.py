@@ -54,12 +54,7 @@ IN_UNITS = {
 }
 RIVALS = few(*IN_UNITS, "quadratic_drag", "position_dependent_friction")
 SLOW = pytest.mark.slow
-UNITS = [
-    (0.01, 1.0),
-    (1.0, 100.0),
-    pytest.param(100.0, 1.0, marks=SLOW),
-    pytest.param(1.0, 0.01, marks=SLOW),
-]
+UNITS = [(0.01, 100.0), pytest.param(100.0, 1.0, marks=SLOW), pytest.param(1.0, 0.01, marks=SLOW)]
 
 
 @cache
@@ -248,7 +243,7 @@ def test_a_lone_bump_is_no_cogging() -> None:
     assert found.base.ratio > 5.0
 
 
-@pytest.mark.parametrize("pole", [0.9, 0.98, 0.995])
+@pytest.mark.parametrize("pole", [0.98, *(pytest.param(p, marks=SLOW) for p in (0.9, 0.995))])
 def test_of_coloured_noise_alone_nothing_is_missing_over_a_floor_of_its_size(pole: float) -> None:
     size, rng = 0.010, np.random.default_rng(1)  # N
 

@@ -80,23 +80,6 @@ def test_a_bad_experiment_file_is_refused_in_one_line(fault, tmp_path):
     assert "\n" not in str(refused.value) or "TOML" in said
 
 
-def test_the_command_writes_an_experiment_that_simulate_runs(tmp_path):
-    rivals = ("cogging", "force_constant_ripple")
-    with in_small(*rivals, proposed=2):
-        answer = twin(
-            "plan", "proton_xy", "--between", *rivals, "--duration", "4", "-o", "next.toml",
-            "--json", folder=tmp_path,
-        )  # fmt: skip
-        ran = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
-    assert answer.returncode == 0, answer.stderr
-    result = json.loads(answer.stdout)
-    assert result["between"] == list(rivals)
-    assert result["expected_difference"] > result["noise_floor"]
-    assert result["file"] == "next.toml"
-    assert ran.returncode == 0, ran.stderr
-    assert read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
-
-
 BAD_INPUT = (
     (("plan", "proton_xy", "--between", "coging", "lugre"), "'cogging'"),
     (("plan", "proton_xy", "--between", "cogging", "cogging"), "different"),
