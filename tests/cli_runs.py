@@ -51,8 +51,8 @@ def refusal(*arguments: object, folder: Path) -> str:
     done = twin(*arguments, folder=folder)
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
-    lines = done.stderr.splitlines()
-    assert len(lines) == 1, done.stderr
+    lines = [line for line in done.stderr.splitlines() if not line.endswith("so far)")]
+    assert len(lines) == 1, done.stderr  # beside what a slow machine says of its progress
     assert lines[0].startswith("twin: ")
     assert sorted(folder.iterdir()) == before, "something was written"
     return lines[0]

@@ -144,7 +144,7 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
     finest = min(cycles / span, 0.5 / step if step else np.inf)
     found: list[float] = []
     for _ in range(MOST_LINES):
-        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest)
+        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest, LEAST)
         chance = np.log(cycles) + 0.5 * len(bend) * np.log1p(-min(share, 0.5))
         if share < LEAST or chance > np.log(RULE.line_chance):
             break

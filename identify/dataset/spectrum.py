@@ -179,17 +179,26 @@ def find_lines(
     return tuple(line for _, line in sorted(out, key=lambda pair: -pair[0]))
 
 
-def strongest_line(record: Record, lowest: float, highest: float) -> tuple[float, float]:
+def strongest_line(
+    record: Record, lowest: float, highest: float, least: float = 0.0
+) -> tuple[float, float]:
     """Frequency from ``lowest`` to ``highest`` of the strongest sine, and its share of variance.
 
     In noise that is white, as its level is not looked at: one transform, for very many samples.
+    Where its power shows that the share is far below ``least`` both are as the transform has them.
     """
     if record.span <= 0.0 or not record.values.any():
         return lowest, 0.0
     grid = _Grid.of([record], highest)
     powers = grid.powers([record])
     inside = (grid.frequencies >= lowest) & (grid.frequencies <= highest)
-    top = grid.top(powers, int(np.argmax(powers[0] * inside)))
+    k = int(np.argmax(powers[0] * inside))
+    top = grid.top(powers, k)
+    # Of a sine of height A a taper w passes |A sum(w)/2|^2. Between two bins it sees two thirds of
+    # that, and of what errs near the ends, where an axis that turns has most samples, far less.
+    share = float(2.0 * powers[0, k] / grid.tapers[0].sum() ** 2 / np.mean(record.values**2))
+    if share < 0.1 * least:
+        return top, share
     frequency, rest = _less_sine([record], top, grid.step)
     return frequency, 1.0 - _energy(rest) / _energy([record])
 

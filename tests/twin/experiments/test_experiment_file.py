@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import in_small, refusal, twin
+from cli_runs import refusal
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
@@ -22,7 +21,6 @@ from twin.experiments.file import (
 )
 from twin.experiments.kinds import Moves, OpenLoopSine, Passes, Rests, Steps, Sweep
 from twin.experiments.named import simulate
-from twin.logs import read_log
 from twin.model.file import load_model
 from twin.simulator import ReducedSimulator
 
