@@ -36,6 +36,8 @@ class AxisCode:
     """The effects in the order of a sample, and the C function of each."""
     arguments: tuple[str, ...]
     """Of the function, after the state."""
+    ahead: float
+    """s by which the setpoint has to come early: half a period of a held command, and the drive."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ def c_source(model: MachineModel) -> CSource:
         lost += [Remark(axis_name, *item) for item in left.items()]
         prefix = f"{name}_{names[axis_name]}"
         more = tuple(f"other_{m}" for m in MOTION) if _reads_other(made) else ()
-        axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), (*MOTION, *more)))
+        ahead = 0.5 * model.period + found.late
+        axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), (*MOTION, *more), ahead))
     remarks = tuple(approximated), tuple(lost)
     return CSource(
         name, _header(model, name, axes, *remarks), _source(model, name, axes, laws), tuple(axes),
@@ -138,6 +141,8 @@ def _declared(a: AxisCode, approximated: tuple[Remark, ...], lost: tuple[Remark,
     ]  # fmt: skip
     states = [f"    double {m}[{n}];" for m, n in _memories(a)]
     lines = [
+        "/* s: give the setpoint of so much later: a command is held, a drive may be late. */\n"
+        f"#define {a.prefix.upper()}_AHEAD {a.ahead!r}\n",
         f"/* Memory of axis {_plain(a.name)}: begin with {a.prefix}_state state = {{0}}; */",
         f"typedef struct {{\n    double calls;\n    double friction; /* {units.force} */",
         *states,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -157,6 +158,9 @@ def test_what_cannot_be_fed_forward_is_told(tmp_path) -> None:
         assert found.late == pytest.approx(AXES[name][name].values["tau"], rel=0.01)
         assert f"{found.late:.3g} s late" in found.approximated[name]
         assert name not in found.axis.names
+        header = c_source(MachineModel("alone", {"x": AXES[name]}, 1.0 / PERIOD)).header
+        (ahead,) = re.findall(r"#define ALONE_X_AHEAD (\S+)", header)
+        assert float(ahead) == pytest.approx(0.5 * PERIOD + found.late)
     assert set(followed(AXES["periodic_disturbance"]).approximated) == {"periodic_disturbance"}
     stage = load_model("proton_xy", CATALOGUE)
     axis = stage.axes["x"].with_effect(AXES["encoder_ripple"]["encoder_ripple"])
