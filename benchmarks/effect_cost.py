@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from benchmarks.timing import Array, interleaved, ratio
-from twin.core.native import call_law, law_address
+from twin.core.compiled import call_at, law_address
 from twin.effect import (
     DRY,
     DT,
@@ -44,7 +44,7 @@ def _drive(law, p, s, io, motion):
         io[V] = motion[1, k]
         io[U] = motion[2, k]
         io[READING] = motion[0, k]
-        call_law(law, p.ctypes.data, s.ctypes.data, io.ctypes.data)
+        call_at(law, (p.ctypes.data, s.ctypes.data, io.ctypes.data))
 
 
 def measure() -> list[Figure]:

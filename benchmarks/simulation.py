@@ -14,13 +14,14 @@ import numpy as np
 from benchmarks import fused
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import Array, interleaved, ratio
+from twin.core.compiled import call_at
 from twin.core.native import Table
 from twin.effects import load_catalogue
 from twin.experiments.kinds import Tracking
 from twin.experiments.trajectory import AnySetpoint
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
-from twin.mujoco.callback import call_step, step_address
+from twin.mujoco.callback import native_address
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 TITLE = "Simulation: LuGre, cable and roller spikes on both axes, 10 kHz"
@@ -50,7 +51,7 @@ class FusedSimulator(ReducedSimulator):
 @numba.njit(cache=True)
 def _bare_steps(step, model, data, n):
     for _ in range(n):
-        call_step(step, model, data)
+        call_at(step, (model, data))
 
 
 class _Simulation:
@@ -89,7 +90,9 @@ def measure() -> list[Figure]:
     by_hand = _Simulation(model, setpoint, FusedSimulator)
     bare, whole, reduced, _ = interleaved(
         [
-            lambda: _bare_steps(step_address(), bare_model._address, bare_data._address, n),
+            lambda: _bare_steps(
+                native_address("mj_step"), bare_model._address, bare_data._address, n
+            ),
             in_mujoco,
             in_reduced,
             by_hand,

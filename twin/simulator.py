@@ -21,9 +21,9 @@ from twin.mujoco.callback import (
     USER_HEADER,
     Driven,
     attach,
+    native_address,
     offsets,
     passive_callback,
-    step_address,
 )
 
 CHUNK = 20_000  # samples that are run, reported and recorded at once
@@ -101,7 +101,7 @@ class MujocoSimulator:
             [(joint.qposadr[0], joint.dofadr[0], motor.id) for joint, motor in joints]
         )
         self._attached = self._attached_joints()
-        self._step = step_address()
+        self._step = native_address("mj_step")
 
     def _attached_joints(self) -> NDArray[np.int64]:
         """For each joint that a structure effect built: qpos, dof, the effect's first state."""

@@ -159,18 +159,21 @@ def _compile(law: Law) -> Any:
 
 
 @intrinsic
-def call_law(typingctx, address, p, s, io):
-    """Call the law at ``address`` with three addresses of doubles."""
+def call_at(typingctx, address, arguments):
+    """Call the function at ``address``, which returns nothing, with a tuple of addresses.
+
+    An int may be among them: up to four arguments are each in a register, whatever their width.
+    """
 
     def codegen(context, builder, signature, args):
-        double_p = context.get_value_type(types.float64).as_pointer()
-        void = context.get_value_type(types.void)
-        fnty = cgutils.ir.FunctionType(void, [double_p] * 3)
+        pointer = context.get_value_type(types.voidptr)
+        given = cgutils.unpack_tuple(builder, args[1])
+        fnty = cgutils.ir.FunctionType(context.get_value_type(types.void), [pointer] * len(given))
         fn = builder.inttoptr(args[0], fnty.as_pointer())
-        builder.call(fn, [builder.inttoptr(a, double_p) for a in args[1:]])
+        builder.call(fn, [builder.inttoptr(a, pointer) for a in given])
         return context.get_dummy_value()
 
-    return types.void(types.int64, types.int64, types.int64, types.int64), codegen
+    return types.void(types.int64, arguments), codegen
 
 
 @intrinsic

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.core.compiled import borrow, compiled, doubles_at
+from twin.core.compiled import borrow, call_at, compiled, doubles_at
 from twin.core.control import RESOLUTION, command, measure
 from twin.core.native import LAST_ACCELERATION, axis_force, sense
 from twin.effect import (
@@ -28,7 +28,7 @@ from twin.effect import (
     V,
     X,
 )
-from twin.mujoco.callback import USER_HEADER, call_step, word_at
+from twin.mujoco.callback import USER_HEADER, word_at
 
 # Columns of the logged signals of one axis.
 READING_COLUMN, COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN = range(4)
@@ -92,7 +92,7 @@ def run_mujoco(
                 a, qpos[where[a, 0]], qvel[where[a, 1]], 0.5 * dt, table, sensing_states, gains,
                 controller_states, setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
             )  # fmt: skip
-        call_step(step, model, data)
+        call_at(step, (model, data))
         for i in range(n_entries):
             forces[k, i] = user[after + n_states + i]
         for i in range(watched.shape[0]):

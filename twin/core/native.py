@@ -18,7 +18,7 @@ from twin.core.compiled import (
     KIND,
     P_AT,
     S_AT,
-    call_law,
+    call_at,
     compiled,
     doubles_at,
     law_address,
@@ -48,11 +48,17 @@ LONGEST_STEP = 2e-4  # s, of attached masses along a measured motion
 
 
 @compiled(inline=True)
-def answer(entry, p, s, io, net, acceleration):
+def call_law(entries, i, p, s, io):
+    """Call the law of entry i; p, s, io: addresses of all parameters, all states and io."""
+    p_at, s_at = p + 8 * int(entries[i, P_AT]), s + 8 * int(entries[i, S_AT])
+    call_at(int(entries[i, ADDRESS]), (p_at, s_at, io))
+
+
+@compiled(inline=True)
+def answer(entries, i, p, s, io, net, acceleration):
     """OUT (N) of a structure effect under these NET and ACC (m/s^2)."""
     io[OUT], io[NET], io[ACC] = 0.0, net, acceleration
-    own_p, own_s = p + 8 * int(entry[P_AT]), s + 8 * int(entry[S_AT])
-    call_law(int(entry[ADDRESS]), own_p, own_s, io.ctypes.data)
+    call_law(entries, i, p, s, io.ctypes.data)
     return io[OUT]
 
 
@@ -67,14 +73,14 @@ def answers(entries, first, last, p, s, io):
     when = io[WHEN]
     io[WHEN] = 0.0
     for i in range(first, last):
-        alone = answer(entries[i], p, s, io, 0.0, 0.0)
-        by_force = answer(entries[i], p, s, io, 1.0, 0.0) - alone
+        alone = answer(entries, i, p, s, io, 0.0, 0.0)
+        by_force = answer(entries, i, p, s, io, 1.0, 0.0) - alone
         if by_force != 0.0:
             moved += alone
             yielding += by_force
         else:
             pushed += alone
-            riding += answer(entries[i], p, s, io, 0.0, 1.0) - alone
+            riding += answer(entries, i, p, s, io, 0.0, 1.0) - alone
     io[WHEN] = when
     return pushed, riding, moved, yielding
 
@@ -91,7 +97,7 @@ def settle(entries, first, last, p, s, io, net, answered, rows, k):
     ridden = (net + pushed) / (mass - riding)
     total = 0.0
     for i in range(first, last):
-        rows[k, i] = answer(entries[i], p, s, io, net / mass, ridden)
+        rows[k, i] = answer(entries, i, p, s, io, net / mass, ridden)
         total += rows[k, i]
     return total
 
@@ -130,7 +136,7 @@ def along(entries, first, last, p, s, io, velocity, k, standing, rows):
         if standing:
             net, ridden = shared(answered, io[MOVED], measured)
         for i in range(first, last):
-            rows[0, i] += answer(entries[i], p, s, io, net, ridden) / steps
+            rows[0, i] += answer(entries, i, p, s, io, net, ridden) / steps
     io[DT] = block
 
 
@@ -201,12 +207,7 @@ def axis_force(entries, first, last, parameters, states, at, io, rows, k):
         before = io[U]
         io[HOLD] = stop + before + total
         io[OUT] = 0.0
-        call_law(
-            int(entries[i, ADDRESS]),
-            p + 8 * int(entries[i, P_AT]),
-            s + 8 * int(entries[i, S_AT]),
-            w,
-        )
+        call_law(entries, i, p, s, w)
         if kind == _FORCE:
             rows[k, i] = io[OUT]
             total += io[OUT]
@@ -232,12 +233,7 @@ def sense(entries, first, last, parameters, states, io, position):
     """Encoder reading of a true position: the sensing effects in order."""
     io[READING] = position
     for i in range(first, last):
-        call_law(
-            int(entries[i, ADDRESS]),
-            parameters.ctypes.data + 8 * int(entries[i, P_AT]),
-            states.ctypes.data + 8 * int(entries[i, S_AT]),
-            io.ctypes.data,
-        )
+        call_law(entries, i, parameters.ctypes.data, states.ctypes.data, io.ctypes.data)
     return io[READING]
 
 

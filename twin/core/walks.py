@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.core.compiled import ADDRESS, KIND, P_AT, S_AT, address_of, borrow, call_law, compiled
+from twin.core.compiled import ADDRESS, KIND, P_AT, S_AT, address_of, borrow, call_at, compiled
 from twin.core.native import along, axis_force, sense, stands
 from twin.effect import (
     A_OTHER,
@@ -166,7 +166,7 @@ def _walk_sets(
             for i in range(laws.shape[1]):
                 io[HOLD] = stop + io[U] + total
                 io[OUT] = 0.0
-                call_law(addresses[i], p + 8 * p_at[i], s + 8 * s_at[i], w)
+                call_at(addresses[i], (p + 8 * p_at[i], s + 8 * s_at[i], w))
                 if kinds[i] == _FORCE:
                     total += io[OUT]
                 elif kinds[i] == _FRICTION:
@@ -199,10 +199,16 @@ def averaged_columns(
     velocity m/s, command N, means over blocks of ``period`` s. time_origin: s, when block 0 was.
     weights (w,): of a test function over blocks; stride: blocks from one to the next.
     """
-    means = np.zeros(
-        (max((motion.shape[1] - len(weights)) // stride + 1, 0), len(effect.strengths))
-    )
-    _averaged(*_columns_of(effect, values), motion, period, time_origin, weights, stride, means)
+    assert effect.columns is not None
+    io = np.zeros(IO_SIZE + 1 + 2 * len(effect.strengths))
+    io[[DT, WHEN]] = period, 0.5
+    states, law = np.zeros(len(effect.states) + 1), address_of(effect.columns)
+    count = max((motion.shape[1] - len(weights)) // stride + 1, 0)
+    means = np.zeros((count, len(effect.strengths)))
+    _averaged(
+        law, np.array([*values, 0.0]), states, io, motion, period, time_origin, weights, stride,
+        means,
+    )  # fmt: skip
     return means.T
 
 
@@ -212,18 +218,9 @@ def reading_columns(effect: Effect, values: Sequence[float], motion: Array, peri
     values: (n_parameters,) of the effect, which has ``columns``. motion (2, n): position m and
     velocity m/s, a sample each ``period`` s.
     """
-    errors = np.zeros((len(effect.strengths), motion.shape[1]))
-    _error_columns(*_columns_of(effect, values), motion, period, errors)
-    return errors
-
-
-def _columns_of(effect: Effect, values: Sequence[float]) -> tuple[int, Array, Array, Array]:
-    """Address of an effect's columns, its parameters, states and ``io``."""
-    assert effect.columns is not None
-    io = np.zeros(IO_SIZE + 1 + 2 * len(effect.strengths))
-    io[WHEN] = 0.5
-    states = np.zeros(len(effect.states) + 1)
-    return address_of(effect.columns), np.array([*values, 0.0]), states, io
+    rows = np.vstack([motion, np.zeros(motion.shape[1])])  # no sensing effect reads a command
+    errors = averaged_columns(effect, values, rows, period, 0.0, np.ones(1), 1)
+    return np.ascontiguousarray(errors)
 
 
 @compiled(nogil=True)
@@ -231,33 +228,17 @@ def _averaged(law, parameters, states, io, motion, dt, time_origin, weights, str
     count = means.shape[0]
     p, s, w = parameters.ctypes.data, states.ctypes.data, io.ctypes.data
     length = weights.shape[0]
-    io[DT] = dt
     for k in range(motion.shape[1]):
         io[INDEX] = k
         io[TIME] = time_origin + k * dt
         io[X] = motion[0, k]
         io[V] = motion[1, k]
         io[U] = motion[2, k]
-        call_law(law, p, s, w)
+        io[READING] = motion[0, k]
+        call_at(law, (p, s, w))
         first = max((k - length + stride) // stride, 0)
         for i in range(first, min(k // stride + 1, count)):
             weight = weights[k - i * stride]
             for j in range(int(io[COLUMNS])):
                 at = COLUMNS + 1 + 2 * j
                 means[i, int(io[at])] += weight * io[at + 1]
-
-
-@compiled(nogil=True)
-def _error_columns(law, parameters, states, io, motion, dt, errors):
-    p, s, w = parameters.ctypes.data, states.ctypes.data, io.ctypes.data
-    io[DT] = dt
-    for k in range(motion.shape[1]):
-        io[INDEX] = k
-        io[TIME] = k * dt
-        io[X] = motion[0, k]
-        io[V] = motion[1, k]
-        io[READING] = motion[0, k]
-        call_law(law, p, s, w)
-        for j in range(int(io[COLUMNS])):
-            at = COLUMNS + 1 + 2 * j
-            errors[int(io[at]), k] = io[at + 1]

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import carray, types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from twin.core.compiled import callback, compiled, doubles_at
@@ -78,9 +77,9 @@ def library() -> ctypes.CDLL:
     return ctypes.CDLL(str(names[0]))
 
 
-def step_address() -> int:
-    """Address of mj_step, for compiled loops."""
-    address = ctypes.cast(library().mj_step, ctypes.c_void_p).value
+def native_address(name: str) -> int:
+    """Address of a function of MuJoCo, for compiled loops."""
+    address = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
     assert address is not None
     return address
 
@@ -146,20 +145,6 @@ def word_at(typingctx, address):
         return builder.load(builder.inttoptr(args[0], word))
 
     return types.int64(types.int64), codegen
-
-
-@intrinsic
-def call_step(typingctx, step, model, data):
-    """Call mj_step(model, data) by addresses."""
-
-    def codegen(context, builder, signature, args):
-        pointer = context.get_value_type(types.voidptr)
-        fnty = cgutils.ir.FunctionType(context.get_value_type(types.void), [pointer] * 2)
-        fn = builder.inttoptr(args[0], fnty.as_pointer())
-        builder.call(fn, [builder.inttoptr(a, pointer) for a in args[1:]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int64, types.int64), codegen
 
 
 @compiled(inline=True)

@@ -17,7 +17,6 @@ meshes of a file need not be there.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -25,15 +24,12 @@ from functools import lru_cache
 
 import mujoco
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from twin.core.compiled import compiled
+from twin.core.compiled import call_at, compiled
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
-from twin.mujoco.callback import Driven, call_step, library, offsets, view, word_at
+from twin.mujoco.callback import Driven, native_address, offsets, view, word_at
 from twin.mujoco.mjcf import read_spec
 from twin.signals import Array
 
@@ -101,8 +97,8 @@ class Mechanism:
         momentum, force = np.empty((2, *position.shape))
         data = mujoco.MjData(self.model)
         _along(
-            _addresses(), self.model._address, data._address, tuple(offsets()[2:]), self.places,
-            *rows, np.zeros((5, self.model.nv)), momentum, force,
+            tuple(map(native_address, CALLS)), self.model._address, data._address,
+            tuple(offsets()[2:]), self.places, *rows, np.zeros((5, self.model.nv)), momentum, force,
         )  # fmt: skip
         return momentum, force
 
@@ -308,43 +304,6 @@ def _strip(joint: mujoco.MjsJoint) -> None:
         setattr(joint, key, 0.0 * np.asarray(getattr(joint, key)))
 
 
-def _addresses() -> tuple[int, ...]:
-    """Of MuJoCo's functions in the order of CALLS."""
-    found = (ctypes.cast(getattr(library(), name), ctypes.c_void_p).value for name in CALLS)
-    return tuple(int(address or 0) for address in found)
-
-
-@intrinsic
-def _call_with(typingctx, function, model, data, out, given):
-    """Call function(model, data, out, given) by addresses."""
-
-    def codegen(context, builder, signature, args):
-        pointer = context.get_value_type(types.voidptr)
-        fnty = cgutils.ir.FunctionType(context.get_value_type(types.void), [pointer] * 4)
-        fn = builder.inttoptr(args[0], fnty.as_pointer())
-        builder.call(fn, [builder.inttoptr(a, pointer) for a in args[1:]])
-        return context.get_dummy_value()
-
-    return types.void(*[types.int64] * 5), codegen
-
-
-@intrinsic
-def _call_bias(typingctx, function, model, data, out):
-    """Call function(model, data, 0, out) by addresses: mj_rne without accelerations."""
-
-    def codegen(context, builder, signature, args):
-        pointer = context.get_value_type(types.voidptr)
-        number = context.get_value_type(types.int32)
-        void = context.get_value_type(types.void)
-        fnty = cgutils.ir.FunctionType(void, [pointer, pointer, number, pointer])
-        fn = builder.inttoptr(args[0], fnty.as_pointer())
-        given = [builder.inttoptr(a, pointer) for a in args[1:]]
-        builder.call(fn, [*given[:2], number(0), given[2]])
-        return context.get_dummy_value()
-
-    return types.void(*[types.int64] * 4), codegen
-
-
 @compiled(nogil=True)
 def _along(
     calls, model, data, off, places, position, velocity, smooth, lent, momentum, force
@@ -362,20 +321,20 @@ def _along(
             qvel[places[1, a]] = smooth[a, k]
             moved[places[1, a]] = velocity[a, k]
             fastest = max(fastest, abs(smooth[a, k]))
-        call_step(kinematics, model, data)
-        call_step(com_pos, model, data)
-        call_step(make_m, model, data)
-        _call_with(mul_m, model, data, product.ctypes.data, moved.ctypes.data)
-        _call_with(mul_m, model, data, before.ctypes.data, speed)
-        call_step(com_vel, model, data)
-        _call_bias(rne, model, data, bias.ctypes.data)
+        call_at(kinematics, (model, data))
+        call_at(com_pos, (model, data))
+        call_at(make_m, (model, data))
+        call_at(mul_m, (model, data, product.ctypes.data, moved.ctypes.data))
+        call_at(mul_m, (model, data, before.ctypes.data, speed))
+        call_at(com_vel, (model, data))
+        call_at(rne, (model, data, 0, bias.ctypes.data))  # 0: without accelerations
         ahead = AHEAD / max(fastest, AHEAD)
         for a in range(n_axes):
             qpos[places[0, a]] += ahead * smooth[a, k]
-        call_step(kinematics, model, data)
-        call_step(com_pos, model, data)
-        call_step(make_m, model, data)
-        _call_with(mul_m, model, data, after.ctypes.data, speed)
+        call_at(kinematics, (model, data))
+        call_at(com_pos, (model, data))
+        call_at(make_m, (model, data))
+        call_at(mul_m, (model, data, after.ctypes.data, speed))
         for a in range(n_axes):
             i = places[1, a]
             momentum[a, k] = product[i]
