@@ -105,9 +105,8 @@ def _each_way(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[list[tuple[A
     bare = replace(axis, effects=())
     ways: dict[float, list[tuple[Array, Array]]] = {1.0: [], -1.0: []}
     for log in logs:
-        velocity = log.test_function.mean(log.motion.velocity)
-        position = log.test_function.mean(log.motion.position)
-        force = residual(bare, [log])
+        mean, force = log.test_function.mean, residual(bare, [log])
+        position, velocity = mean(log.motion.position), mean(log.motion.velocity)
         speed = float(np.quantile(np.abs(velocity), 0.9))
         steady = np.abs(np.abs(velocity) - speed) < STEADY * speed
         signed = np.where(steady, np.sign(velocity), 0.0)

@@ -90,9 +90,7 @@ def fit_bristles(
     def left(x: Array, logs: Sequence[PreparedLog]) -> Array:
         return residual(write(known, where, x), logs)
 
-    def search(
-        logs: Sequence[PreparedLog], start: Array, evaluations: int = MOST_EVALUATIONS
-    ) -> Array:
+    def search(logs: Sequence[PreparedLog], start: Array, evaluations: int) -> Array:
         return minimise(
             lambda x: left(x, logs), lambda x: jacobian(write(known, where, x), logs, where),
             start, (low, high), tolerance=TOLERANCE, most_evaluations=evaluations,
@@ -104,4 +102,4 @@ def fit_bristles(
     heads = [PreparedLog.of(w.motion.head(HEAD), w.test_function.length) for w in logs]
     tried = [search(heads, start, FIRST_EVALUATIONS) for start in starts]
     best = min(tried, key=lambda x: float(np.sum(left(x, heads) ** 2)))
-    return write(known, where, search(logs, best))
+    return write(known, where, search(logs, best, MOST_EVALUATIONS))

@@ -14,13 +14,7 @@ import numpy as np
 
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import (
-    LONGEST_BLOCK,
-    SHORTEST_BLOCK,
-    Motion,
-    bodies_along,
-    motion_of,
-)
+from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, bodies_along, motion_of
 from identify.dataset.prepared_log import at_rest
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
@@ -41,9 +35,7 @@ ROWS = 4 * BLOCKS  # test functions in motion, that tell the values and how sure
 AT_REST = 0.02  # part of a test function, from which what static friction holds is in its force
 TURNS = 1.0  # rad, from which gravity is a sine of the angle, and no spring
 STOOD = 0.05  # s at rest before a motion begins from rest
-NEARLY = (
-    1.5  # times what viscous friction leaves, up to which Coulomb's is believed: drives have it
-)
+NEARLY = 1.5  # times what viscous friction leaves, up to which Coulomb's is believed
 ONE_WAY = 0.8  # mean direction from which nine tenths of the motion go one way
 ROUNDING = 1e-9  # of the force: smaller gains of columns of unit size are none
 SMOOTHED = 5  # blocks, over which the force at rest is averaged before its peak is taken
@@ -244,9 +236,8 @@ def first_model(
                 if found.mass is not None:
                     break
             constant = next(iter(going.values())).axes[axis].force_constant
-            axes[axis] = _first_axis(
-                axis, motions, found, constant, catalogue, begun.axes.get(axis)
-            )
+            joint = begun.axes.get(axis)
+            axes[axis] = _first_axis(axis, motions, found, constant, catalogue, joint)
     if not axes:
         raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
     return replace(begun, axes={**begun.axes, **axes})
@@ -290,10 +281,9 @@ def _first_axis(
             f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
             "little of the force; give a log with faster changes of speed"
         )
-    window = [TestFunction.at_least(TEST_FUNCTION, m.period) for m in motions]
     reached = max(
-        float(np.abs(w.acceleration(m.velocity)).max())
-        for w, m in zip(window, motions, strict=True)
+        float(np.abs(TestFunction.at_least(TEST_FUNCTION, m.period).acceleration(m.velocity)).max())
+        for m in motions
     )
     margin = MARGIN * covered.travel
     low, high = covered.position_low - margin, covered.position_high + margin
@@ -324,10 +314,10 @@ def _first_effects(
     values = {"Fc": found.coulomb, "Fs": static, "sigma2": found.viscous}
     own = {n: _shown(v) for n, v in values.items() if n in friction.starts(covered)}
     effects = [Fitted.at_start(friction, {**friction.starts(covered), **own}, units)]
-    forces = (e for e in known if e.kind is Kind.FORCE and not e.states and found.constant)
-    for force in (e for e in forces if [p.unit for p in e.parameters] == ["N"]):
-        (own_force,) = force.parameters
-        effects.append(Fitted.at_start(force, {own_force.name: _shown(-found.constant)}, units))
+    for force in (e for e in known if e.kind is Kind.FORCE and not e.states and found.constant):
+        if [p.unit for p in force.parameters] == ["N"]:
+            level = {force.parameters[0].name: _shown(-found.constant)}
+            effects.append(Fitted.at_start(force, level, units))
     return tuple(effects)
 
 

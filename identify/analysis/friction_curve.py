@@ -119,20 +119,18 @@ def _with_intervals(
     return MapCurve(curve, dict(zip(names, half, strict=True)))
 
 
-def start_rule(speed: Array, friction: Array, n: float = 2.0) -> StribeckCurve:
+def start_rule(speed: Array, friction: Array) -> StribeckCurve:
     """The thesis's start values from a map: speeds (k,) m/s and friction (k,) N, k >= 2."""
     least, highest = int(np.argmin(friction)), int(np.argmax(speed))
     run = speed[highest] - speed[least]
     slope = (friction[highest] - friction[least]) / run if run > 0.0 else 0.0
     static = float(friction[np.argmin(speed)])
     return StribeckCurve(
-        float(friction[least]), static, float(speed[least]), float(max(slope, 0.0)), n
+        float(friction[least]), static, float(speed[least]), float(max(slope, 0.0))
     )
 
 
-def fit_stribeck(
-    speed: Array, friction: Array, weight: Array | None = None, n: float = 2.0
-) -> StribeckCurve:
+def fit_stribeck(speed: Array, friction: Array, weight: Array | None = None) -> StribeckCurve:
     """The curve through a map by Levenberg-Marquardt from the start rules.
 
     speed (k,) m/s > 0, friction (k,) N, weight (k,) 1/N or None for equal ones. Raises InputError
@@ -144,21 +142,18 @@ def fit_stribeck(
             "a log with more speeds"
         )
     scale = np.ones_like(speed) if weight is None else weight
-    start = np.array(astuple(start_rule(speed, friction, n))[:4])
-
-    def curve(x: Array) -> StribeckCurve:
-        return StribeckCurve(x[0], x[1], x[2], x[3], n)
+    start = np.array(astuple(start_rule(speed, friction))[:4])
 
     def residual(x: Array) -> Array:
-        return np.asarray(scale * (curve(x)(speed) - friction))
+        return np.asarray(scale * (StribeckCurve(*x)(speed) - friction))
 
     low = np.array([0.0, 0.0, SLOWEST * speed.min(), 0.0])
     high = np.array([np.inf, np.inf, 10.0 * speed.max(), np.inf])
     ends = [
         minimise(
-            residual, lambda x: scale[:, None] * curve(x).slopes(speed),
+            residual, lambda x: scale[:, None] * StribeckCurve(*x).slopes(speed),
             start * (1.0, 1.0, part, 1.0), (low, high),
         ).x
         for part in PARTS
     ]  # fmt: skip
-    return curve(min(ends, key=lambda x: float(np.sum(residual(x) ** 2))))
+    return StribeckCurve(*min(ends, key=lambda x: float(np.sum(residual(x) ** 2))))

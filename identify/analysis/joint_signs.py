@@ -23,25 +23,23 @@ from twin.model.machine import MachineModel
 from twin.signals import Array
 
 SIGNALS = ("position", "force", "current")  # a velocity has a unit and a sign of its own
+HEAD = 240.0  # s of all joints together, of the log's beginning that tells it
+LEAST_LEFT = 0.01  # of a joint's squared torque: where none leaves as much, all is right
+MOST_TRIED = 8  # joints, those that leave most: each asks for the torques of all joints anew
 LEAST_FALL = 0.5  # of the squared torque that is left, from which another assignment is believed
 
 
-def misassigned(
-    model: MachineModel, log: Log, duration: float = 240.0, least: float = 0.01, most: int = 8
-) -> str | None:
+def misassigned(model: MachineModel, log: Log) -> str | None:
     """What of a log seems to be of another sign, unit or joint, in a sentence; None if nothing.
 
-    model: its axes are joints of a mechanism. duration: s, of all joints
-    together, of the log's beginning that tells it.
-    Where no joint leaves ``least`` of its squared torque, all is right. Tried are the ``most``
-    joints that leave most of it, as each asks for the torques of all joints anew.
+    model: its axes are joints of a mechanism.
     """
-    head = _plain(log.part(0, min(round(duration / len(model.joints) / log.period), len(log))))
+    head = _plain(log.part(0, min(round(HEAD / len(model.joints) / log.period), len(log))))
     going = [axis for axis in model.joints if moves(head, axis)]
     parts = _left(model, head, going)
-    if max(parts, default=0.0) < least:
+    if max(parts, default=0.0) < LEAST_LEFT:
         return None
-    worst = sorted(zip(parts, going, strict=True), reverse=True)[:most]
+    worst = sorted(zip(parts, going, strict=True), reverse=True)[:MOST_TRIED]
     suspects = [axis for axis in going if axis in {a for _, a in worst}]
     tried = ((float(_left(model, o, going).sum()), s) for o, s in _others(model, head, suspects))
     best, given = min(tried), float(parts.sum())
@@ -74,10 +72,10 @@ def _others(model: MachineModel, log: Log, suspects: Sequence[str]) -> Iterator[
 
 def _plain(log: Log) -> Log:
     """The log with positions and torques alone."""
-    axes = {
-        name: replace(own, columns={n: own.columns[n] for n in SIGNALS if n in own.columns})
-        for name, own in log.axes.items()
-    }
+    axes = {}
+    for name, own in log.axes.items():
+        kept = {n: own.columns[n] for n in SIGNALS if n in own.columns}
+        axes[name] = replace(own, columns=kept)
     return replace(log, axes=axes)
 
 

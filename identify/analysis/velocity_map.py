@@ -88,13 +88,11 @@ def _averaged(
 ) -> tuple[float, float, float, float]:
     """Velocity, friction, position and effective samples of the blocks [first, last)."""
     per_block = round(motion.period / motion.sample_period)
-    part = slice(first, last)
+    signals = np.stack([motion.position, motion.velocity, force])[:, first:last]
     whole = TestFunction.of_length((last - first) * motion.period, motion.period)
-    acceleration = whole.acceleration(motion.velocity[part])[0]
+    acceleration = whole.acceleration(signals[1])[0]
     whole = whole.sharpened(per_block)
-    position, velocity, pushing = (
-        float(whole.mean(signal[part])[0]) for signal in (motion.position, motion.velocity, force)
-    )
+    position, velocity, pushing = (float(whole.mean(signal)[0]) for signal in signals)
     friction = np.sign(velocity) * (pushing - mass * acceleration)
     return velocity, friction, position, per_block / float(np.sum(whole.weights**2))
 

@@ -68,8 +68,7 @@ def proposals(
     Also those of the family that are not among them, with the reason. Raises CannotRun where the
     travel is not known, and where none fits.
     """
-    model.axis(axis)
-    own, limits = model.axes[axis], dict(zip(model.axes, machine_limits(model), strict=True))
+    own, limits = model.axis(axis), dict(zip(model.axes, machine_limits(model), strict=True))
     others = [v.travel for name, v in limits.items() if name != axis]
     other = neat(USED * (others[0][1] - others[0][0])) if len(others) == 1 else 0.0
     effort = min(
@@ -77,22 +76,16 @@ def proposals(
     )
     limit, scale = gentle(limits[axis], effort), _scale(own)
     room = _Room(own, axis, limit, other, duration, scale, model.sample_rate)
-    drafts = (
-        *room.general(),
-        *room.passing(),
-        *room.reversing(),
-        *room.accelerating(),
-        *room.swept(),
-    )
+    kinds = room.general(), room.passing(), room.reversing(), room.accelerating(), room.swept()
     found, not_run = [], []
-    for draft in drafts:
+    for draft in itertools.chain(*kinds):
         if effort < 1.0 and isinstance(draft, OneAxis):  # its moves no harder than the motor allows
             draft = replace(draft, effort=neat(effort * draft.effort))
         experiment = lasting(draft, model, duration)
         try:
             _require_fit(experiment, model, duration)
         except CannotRun as why:
-            not_run.append(NotRun(experiment, str(why), model.axes[axis].units))
+            not_run.append(NotRun(experiment, str(why), own.units))
         else:
             found.append(experiment)
     if not found:

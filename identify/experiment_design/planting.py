@@ -50,28 +50,19 @@ def draw_effect(
     excitation: Excitation,
     force: float,
     rng: np.random.Generator,
-    beside: Fit | None = None,
 ) -> Fitted:
     """Random values of an effect such that it changes the axis' force by ``force`` (N RMS).
 
     Nonlinear parameters are drawn from the range that a diagnosis scans, or about their start where
     they are not scanned. Linear parameters (strengths) get a random direction and are scaled on the
-    motion of the logs. beside: a fit to those logs; then only the part of the force counts that its
-    parameters cannot reproduce.
+    motion of the logs.
     """
     values = effect.starts(excitation)
     for p in effect.parameters:
         if not (p.strength or p.fixed):
             values[p.name] = _drawn_shape(p, values[p.name], excitation, rng)
     base = residual(axis, logs)
-    basis = beside.basis if beside else np.zeros((len(base), 0))
-    kept = beside.kept if beside else np.ones(len(base), dtype=bool)
-
-    def added(fitted: Fitted) -> Array:
-        force = added_force(fitted, axis, logs, base)[kept]
-        return unabsorbed(force, basis)
-
-    return strength_for(effect, added, force, values, rng)
+    return strength_for(effect, lambda f: added_force(f, axis, logs, base), force, values, rng)
 
 
 def _drawn_shape(
@@ -86,6 +77,11 @@ def _drawn_shape(
     return min(max(drawn, p.lower), p.upper)
 
 
+def _drawn_direction(p: Parameter, rng: np.random.Generator) -> float:
+    size = float(rng.uniform(0.5, 1.5))
+    return size if p.lower >= 0 else float(size * rng.choice((-1.0, 1.0)))
+
+
 def strength_for(
     effect: Effect,
     added: Callable[[Fitted], Array],
@@ -98,20 +94,13 @@ def strength_for(
     values: the other parameters. rng: draws the ratios of the strengths; all are equal where None.
     """
     values = values or effect.starts()
-    direction = dict.fromkeys((p.name for p in effect.strengths), 1.0)
-    for p in effect.strengths:
-        if rng is None:
-            break
-        size = float(rng.uniform(0.5, 1.5))
-        direction[p.name] = size if p.lower >= 0 else float(size * rng.choice((-1.0, 1.0)))
+    direction = {p.name: 1.0 if rng is None else _drawn_direction(p, rng) for p in effect.strengths}
     limits = {p.name: p.at_least for p in effect.parameters if p.at_least}
 
     def at(scale: float) -> Fitted:
-        moved = {
-            p.name: float(np.clip(scale * direction[p.name], p.lower, p.upper))
-            for p in effect.strengths
-        }
-        drawn = {**values, **moved}
+        drawn = dict(values)
+        for p in effect.strengths:
+            drawn[p.name] = float(np.clip(scale * direction[p.name], p.lower, p.upper))
         for name, least in limits.items():
             drawn[least], drawn[name] = sorted((drawn[least], drawn[name]))
         return Fitted.at_start(effect, drawn)
@@ -187,10 +176,9 @@ def exemplary_motion() -> Motion:
     position = np.concatenate(parts)
     velocity = rate(position, PERIOD)
     command = MASS * rate(velocity, PERIOD) + 0.3 * np.sign(velocity)
-    others = np.zeros((3, len(position)))
-    others[0] = 0.5 * np.roll(position, len(position) // 7)
-    others[1] = rate(others[0], PERIOD)
-    others[2] = rate(others[1], PERIOD)
+    other = 0.5 * np.roll(position, len(position) // 7)
+    speed = rate(other, PERIOD)
+    others = np.stack([other, speed, rate(speed, PERIOD)])
     return Motion(
         name="exemplary", axis="x", signals=np.stack([position, velocity, command]), others=others,
         period=PERIOD, start=0.0, sample_period=PERIOD, position_noise=0.0,
@@ -210,6 +198,5 @@ def signature(effect: Effect, catalogue: Catalogue) -> tuple[Motion, Array]:
     def added(fitted: Fitted) -> Array:
         return total_force(axis_table({motion.axis: axis.with_effect(fitted)}), motion) - base
 
-    if effect.kind is Kind.FRICTION:
-        return motion, added(Fitted.at_start(effect))
-    return motion, added(strength_for(effect, added, FORCE))
+    rubs = effect.kind is Kind.FRICTION
+    return motion, added(Fitted.at_start(effect) if rubs else strength_for(effect, added, FORCE))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Dataset
@@ -19,7 +19,6 @@ from twin.effect import Effect, Kind
 from twin.errors import InputError
 from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate
-from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
 from twin.simulator import ReducedSimulator
@@ -32,10 +31,8 @@ Rival = Effect | MachineModel
 
 def simulated_dataset(machine: MachineModel, axis: str) -> Dataset:
     """A dataset of simulated random moves of the model, for use when there are no logs."""
-    log: Mapping[str, Log] = {
-        "simulated": simulate(machine, Tracking(SIMULATED), seed=0, simulator=ReducedSimulator)
-    }
-    return datasets(machine, log, {})[axis]
+    log = simulate(machine, Tracking(SIMULATED), seed=0, simulator=ReducedSimulator)
+    return datasets(machine, {"simulated": log}, {})[axis]
 
 
 def explained(
@@ -56,15 +53,14 @@ def explained(
     for rival in rivals:
         if isinstance(rival, MachineModel):
             axis = replace(rival.axis(dataset.axis), hardware=own.hardware)
-            out.append(
-                Explanation(rival.name, fit_multistart(axis, dataset).axis if fitted else axis)
-            )
+            axis = fit_multistart(axis, dataset).axis if fitted else axis
         elif fit is not None:
-            out.append(Explanation(rival.name, try_effect(fit, dataset, rival).fit.axis))
+            axis = try_effect(fit, dataset, rival).fit.axis
         elif rival.name in own.names:
-            out.append(Explanation(rival.name, base.with_effect(own[rival.name])))
+            axis = base.with_effect(own[rival.name])
         else:
-            out.append(Explanation(rival.name, _supposed(rival, base, dataset)))
+            axis = _supposed(rival, base, dataset)
+        out.append(Explanation(rival.name, axis))
     return tuple(out)
 
 
@@ -74,10 +70,8 @@ def _supposed(effect: Effect, axis: AxisModel, dataset: Dataset) -> AxisModel:
     A friction is fitted to the dataset instead, as it replaces the friction of the axis.
     """
     if effect.kind is Kind.FRICTION:
-        base = fit_axis(axis, dataset.fit)
-        return fit_axis(
-            axis.with_effect(start_values(base, dataset, effect)[0].fitted), dataset.fit
-        ).axis
+        first = start_values(fit_axis(axis, dataset.fit), dataset, effect)[0]
+        return fit_axis(axis.with_effect(first.fitted), dataset.fit).axis
     floor = floor_of(axis, dataset.fit)
     without = residual(axis, dataset.fit)
 

@@ -8,7 +8,7 @@ An effect that only one of the fits has is, in the other, an effect of no streng
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import hypot, inf
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate
 from twin.model.machine import MachineModel
-from twin.model.parameters import ParameterReference, free_parameters, write
+from twin.model.parameters import ParameterReference, all_parameters, free_parameters, read, write
 from twin.signals import Array
 from twin.simulator import ReducedSimulator
 
@@ -109,7 +109,7 @@ class Agreement:
     """Two fits, axis by axis. not_compared: axes without intervals in one of them."""
 
     axes: Mapping[str, AxisAgreement]
-    not_compared: Sequence[str] = field(default=())
+    not_compared: Sequence[str] = ()
 
     @property
     def agrees(self) -> bool:
@@ -187,18 +187,9 @@ class _Number(NamedTuple):
 def _numbers(model: MachineModel, axis: str) -> dict[str, _Number]:
     """All parameters of an axis by label, the mass first."""
     stage, intervals = model.axes[axis], model.intervals[axis].ends
-    free = {c.label for c in free_parameters(stage)}
-    every = [
-        (ParameterReference("", stage.mass_parameter), stage.mass),
-        *(
-            (ParameterReference(f.effect.name, p), float(f.values[p.name]))
-            for f in stage.effects
-            for p in f.effect.parameters
-        ),
-    ]
-    out = {}
-    for reference, value in every:
-        error: float | None = None if reference.label in free else 0.0
+    every, free, out = all_parameters(stage), free_parameters(stage), {}
+    for reference, value in zip(every, read(stage, every).tolist(), strict=True):
+        error: float | None = None if reference in free else 0.0
         if reference.label in intervals:
             low, high = intervals[reference.label]
             error = max(high - value, value - low) / QUANTILE

@@ -30,7 +30,6 @@ from identify.validation.misfit_maps import (
     coordinates,
     misfit_by_frequency,
     misfit_maps,
-    periods,
     worst_regions,
 )
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
@@ -51,9 +50,7 @@ class AxisComparison:
     force_error: N RMS of the force residual, by log. floor: N. position_error: m RMS of the free
     run, by log; position_floor: the same from measurement noise alone. residual (n,) N, coordinates
     name -> (n,). kept: which test functions of the logs in a row (all,) tell something, n of them.
-    periods: lengths (m) at which effects of the model repeat along the track, by the coordinate
-    that is the phase. curves: force (m,) N of each nonparametric effect along the motion of the
-    logs in a row, by name.
+    curves: force (m,) N of each nonparametric effect along the motion of the logs, by its name.
     """
 
     axis: str
@@ -68,7 +65,6 @@ class AxisComparison:
     worst: Sequence[Region]
     tests: ResidualTests
     kept: NDArray[np.bool_]
-    periods: Mapping[str, float] = field(default_factory=dict)
     curves: Mapping[str, Array] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -122,23 +118,17 @@ def compare_axis(
         worst=worst_regions(maps, effective_samples(force)),
         tests=residual_tests(logs, every, kept, floor, loop_of(logs)),
         kept=kept,
-        periods=periods(axis),
         curves=_nonparametric_forces(axis, logs),
     )
 
 
 def _nonparametric_forces(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
     """The force (m,) N of each nonparametric effect along the motion of logs in a row."""
-    rotary = logs[0].motion.units.rotary
-    alone = {
-        f.effect.name: AxisModel(1.0, effects=(f,), rotary=rotary)
-        for f in axis.effects
-        if f.effect.is_nonparametric
-    }
-    return {
-        name: np.concatenate([total_force(on_blocks(own), log.motion) for log in logs])
-        for name, own in alone.items()
-    }
+    found = {}
+    for f in (f for f in axis.effects if f.effect.is_nonparametric):
+        alone = on_blocks(AxisModel(1.0, effects=(f,), rotary=axis.rotary))
+        found[f.effect.name] = np.concatenate([total_force(alone, log.motion) for log in logs])
+    return found
 
 
 def position_errors(

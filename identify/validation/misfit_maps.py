@@ -86,22 +86,10 @@ def coordinates(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array
     where["command"] = np.concatenate([log.command for log in logs])
     velocity = np.concatenate([log.test_function.mean(log.motion.velocity) for log in logs])
     where["standstill"] = at_rest(velocity).astype(float)
-    for phase, period in periods(axis).items():
-        where[phase] = np.mod(where["position"], period)
+    for f in axis.effects:
+        for p in (p for p in f.effect.parameters if p.period):
+            where[f"{f.effect.name}_phase"] = np.mod(where["position"], f.values[p.name])
     return where
-
-
-def periods(axis: AxisModel) -> dict[str, float]:
-    """Lengths (m) at which effects of the model repeat along the track, by the coordinate.
-
-    The coordinate is the position within one period.
-    """
-    return {
-        f"{f.effect.name}_phase": f.values[p.name]
-        for f in axis.effects
-        for p in f.effect.parameters
-        if p.period
-    }
 
 
 def misfit_maps(
@@ -112,13 +100,9 @@ def misfit_maps(
     where: Mapping[str, Array],
 ) -> list[MisfitMap]:
     """The misfit of a force (n,) N, with its noise floor in N, along each coordinate (n,)."""
-    return [
-        misfit_map(
-            name, force, values, floor,
-            unit_of(name, logs[0].motion, KNOWN_UNITS), axis.units.force,
-        )
-        for name, values in where.items()
-    ]  # fmt: skip
+    motion = logs[0].motion
+    units = {name: unit_of(name, motion, KNOWN_UNITS) for name in where}
+    return [misfit_map(n, force, v, floor, units[n], axis.units.force) for n, v in where.items()]
 
 
 def misfit_map(
@@ -229,7 +213,7 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
     floor by more than the largest of as many regions of pure noise would.
     """
     tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
-    found: list[tuple[float, Region]] = []
+    found = []
     for m in maps:
         excess = np.where(m.rms > ABOVE_FLOOR * m.floor, m.share - m.visited, 0.0)
         if excess.max() < LEAST_SHARE:
@@ -243,9 +227,10 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
         low, high, error, floor, share, visited = (
             float(values[i]) for values in (m.low, m.high, m.rms, m.floor, m.share, m.visited)
         )
-        ratio = error / floor
-        region = Region(m.coordinate, m.unit, low, high, error, ratio, share, m.force_unit, visited)
         if excess[i] >= LEAST_SHARE:
-            found.append((float(excess[i]), region))
+            region = Region(
+                m.coordinate, m.unit, low, high, error, error / floor, share, m.force_unit, visited
+            )
+            found.append((excess[i], region))
     found.sort(key=lambda pair: -pair[0])
     return [region for _, region in found[:count]]

@@ -16,6 +16,7 @@ from twin.entries import read_entries, read_toml
 from twin.errors import InputError, at
 from twin.files import write_atomically
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
+from twin.model.parameters import all_parameters, read
 from twin.model.schema import AxisEntry, EffectEntry, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
@@ -299,10 +300,8 @@ def read_intervals(
     for axis, entries in given.items():
         if axis not in axes:
             raise InputError(f"{ENTRY}: the model has no axis '{axis}'; it has {', '.join(axes)}")
-        values = {
-            axes[axis].mass_parameter.name: axes[axis].mass,
-            **{f"{f.effect.name}.{n}": v for f in axes[axis].effects for n, v in f.values.items()},
-        }
+        known = all_parameters(axes[axis])
+        values = dict(zip((c.label for c in known), read(axes[axis], known), strict=True))
         ratio, ends = entries.get(ABOVE_FLOOR, 1.0), {}
         if not isinstance(ratio, float):
             raise InputError(
@@ -329,10 +328,9 @@ def intervals_table(model: MachineModel) -> tomlkit.items.Table:
         entries.comment(COMMENT)
         meaning = axis.units.words("1, force error over noise floor")
         entries[ABOVE_FLOOR] = tomlkit.item(intervals.above_floor).comment(meaning)
+        own_units = {c.label: axis.units(c.parameter.unit) for c in all_parameters(axis)}
         for label, ends in intervals.ends.items():
-            effect, _, parameter = label.rpartition(".")
-            own = axis[effect].effect.parameter(parameter) if effect else axis.mass_parameter
-            value = tomlkit.item(list(ends)).comment(axis.units(own.unit))
+            value = tomlkit.item(list(ends)).comment(own_units[label])
             entries.append(tomlkit.key([label]), value)
         table[name] = entries
     return table

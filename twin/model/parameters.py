@@ -27,16 +27,24 @@ class ParameterReference:
         return f"{self.effect}.{self.parameter.name}" if self.effect else self.parameter.name
 
 
-def free_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
-    """The free numbers of an axis: its mass unless fixed or none, then those of its effects."""
-    held = axis.mass_fixed or axis.is_imposed
-    mass = () if held else (ParameterReference("", axis.mass_parameter),)
-    return mass + tuple(
-        ParameterReference(f.effect.name, p)
-        for f in axis.effects
-        for p in f.effect.parameters
-        if p.name not in f.fixed and p.lower < p.upper
+def all_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
+    """The numbers of an axis: its mass, then those of its effects."""
+    of_effects = (
+        ParameterReference(f.effect.name, p) for f in axis.effects for p in f.effect.parameters
     )
+    return ParameterReference("", axis.mass_parameter), *of_effects
+
+
+def free_parameters(axis: AxisModel) -> tuple[ParameterReference, ...]:
+    """Those that a fit may change: not what is fixed, nor the mass where there is none."""
+    fixed = {f.effect.name: f.fixed for f in axis.effects}
+    mass, *others = all_parameters(axis)
+    free = [
+        c
+        for c in others
+        if c.parameter.name not in fixed[c.effect] and c.parameter.lower < c.parameter.upper
+    ]
+    return tuple(free) if axis.mass_fixed or axis.is_imposed else (mass, *free)
 
 
 def read(axis: AxisModel, where: Iterable[ParameterReference]) -> NDArray[np.float64]:
