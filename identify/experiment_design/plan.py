@@ -107,7 +107,11 @@ def plan(
     """
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
-    _require_plain(model)
+    if model.joints:
+        raise CannotRun(
+            f"{model.name}: its axes are joints of {model.mjcf_name}, for which no experiment is "
+            "planned; log slow passes both ways and strong accelerations in several poses of each"
+        )
     if axis is not None:
         model.axis(axis)
     require_length(duration, model.sample_rate)
@@ -125,22 +129,13 @@ def plan(
     return _planned(arena, duration, VERIFIED, not logs, effects, progress)
 
 
-def _require_plain(model: MachineModel) -> None:
-    if model.joints:
-        raise CannotRun(
-            f"{model.name}: its axes are joints of {model.mjcf_name}, for which no experiment is "
-            "planned; log slow passes both ways and strong accelerations in several poses of each"
-        )
-
-
 def next_experiments(
     axes: Mapping[str, AxisDiagnosis], model: MachineModel, test_function: float | None = None
 ) -> tuple[dict[str, Plan], dict[str, str]]:
     """By axis, the experiment that decides an ambiguous diagnosis, or why the machine can run none.
 
     Both are empty for an axis where less than two explanations are left, and for a joint of a
-    mechanism. test_function: length that
-    the diagnosis used, s; None where it was chosen from the noise.
+    mechanism. test_function: length that the diagnosis used, s; None where chosen from the noise.
     """
     plans, not_planned = {}, {}
     for axis, found in axes.items():
@@ -180,17 +175,17 @@ def _planned(
             f"the first: {first}"
         )
     progress("best experiments judged by refits", 0, 1)
-    chosen, *others = _verified(arena, ranked, verified)
+    ranking = tuple(_verified(arena, ranked, verified))
     names = tuple(e.name for e in arena.explanations)
     return Plan(
         axis=arena.name,
         between=names,
-        ranking=(chosen, *others),
-        gap=gap(chosen.motion, chosen.where, logs),
+        ranking=ranking,
+        gap=gap(ranking[0].motion, ranking[0].where, logs),
         favoured=favourite if evidence > RULE.least_bic else None,
         excited_by={n: effects[n].excited_by for n in names if n in effects},
         supposed=supposed,
-        not_run=(*too_long, *not_run, *(t.not_run for t in (chosen, *others) if t.not_run)),
+        not_run=(*too_long, *not_run, *(t.not_run for t in ranking if t.not_run)),
     )
 
 
@@ -201,14 +196,13 @@ def _verified(
 
     It stops when a refitted experiment leads. ranked: by falling evidence. most: refitted at most.
     """
-    waiting = list(ranked)
     done: list[SimulatedExperiment] = []
-    while waiting and len(done) < most:
-        done.append(refitted(arena, waiting.pop(0)))
-        done.sort(key=lambda t: -t.gain)
-        if waiting and done[0].gain >= waiting[0].gain:
+    for i, one in enumerate(ranked[:most]):
+        if i and done[0].gain >= one.gain:
             break
-    return [*done, *waiting]
+        done.append(refitted(arena, one))
+        done.sort(key=lambda t: -t.gain)
+    return [*done, *ranked[len(done) :]]
 
 
 def _dataset(
@@ -222,10 +216,8 @@ def _dataset(
     """The dataset of the axis to be explained; of a simulated log where there are no logs."""
     if not logs:
         return simulated_dataset(model, axis or differing_axis(between, model))
-    training, selection = (
-        logs_by_name(given, role.value)
-        for given, role in ((logs, Role.TRAINING), (holdout, Role.SELECTION))
-    )
+    training = logs_by_name(logs, Role.TRAINING.value)
+    selection = logs_by_name(holdout, Role.SELECTION.value)
     found = datasets(model, training, selection, test_function)
     name = axis or differing_axis(between, model)
     if name in found:

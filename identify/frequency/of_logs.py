@@ -43,25 +43,22 @@ def responses_of(
     logs: Mapping[str, Log], model: MachineModel | None = None, progress: Progress = silent
 ) -> dict[str, AxisFrequency]:
     """By axis that moves in all of the logs; see identify.workflow.frequency_response."""
-    given = dict(logs)
-    first = next(iter(given.values()))
-    names = [a for a in first.axes if all(_moves(log, a) for log in given.values())]
+    first = next(iter(logs.values()))
+    names = [a for a in first.axes if all(_moves(log, a) for log in logs.values())]
     names = [a for a in names if model is None or a in model.axes]
     if not names:
         raise InputError(
             "no axis moves under a changing force in all of the logs; give logs of one axis that "
             "moves, named as in the model"
         )
-    simulated = {} if model is None else _simulated(given, model, progress)
+    simulated = {} if model is None else _simulated(logs, model, progress)
     axes = {}
     for i, name in enumerate(names):
         progress("frequency response", i, len(names))
-        controller = None
-        if model is not None:
-            controller = Controller.for_axis(model.axes[name])
+        controller = None if model is None else Controller.for_axis(model.axes[name])
         axes[name] = AxisFrequency(
             first.axes[name].kind,
-            _shown(given, name, controller),
+            _shown(logs, name, controller),
             _shown(simulated, name, controller) if simulated else None,
         )
     return axes

@@ -77,11 +77,9 @@ def plant_of(found: Response, most: int = 4) -> Plant:
             "too few for a mass; excite the axis more: `twin simulate multisine`"
         )
     told = replace(told, spread=np.hypot(told.spread, NEAREST * np.abs(told.plant)))
-    best = min((_solved(told, start) for start in _without_modes(told)), key=lambda s: s.cost)
+    best = _best_from(told, _without_modes(told))
     for _ in range(most):
-        better = min(
-            (_solved(told, start) for start in _with_mode(told, best)), key=lambda s: s.cost
-        )
+        better = _best_from(told, _with_mode(told, best))
         # Twice the fall of the cost is that of a log likelihood; three values more.
         if best.cost - better.cost < 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic:
             break
@@ -133,13 +131,17 @@ class _Solved:
         return tuple(sorted(modes, key=lambda m: m.frequency.value))
 
 
+def _best_from(told: Response, starts: Sequence[Array]) -> _Solved:
+    return min((_solved(told, start) for start in starts), key=lambda s: s.cost)
+
+
 def _solved(told: Response, start: Array) -> _Solved:
     from scipy.optimize import least_squares  # takes a while to load
 
     modes = (len(start) - 4) // 3
 
     def left(values: Array) -> Array:
-        error = (_sampled(values, told) - told.plant) / told.spread
+        error = _left(values, told)
         return np.concatenate([error.real, error.imag]) * np.sqrt(2.0)
 
     omega = np.log(2.0 * np.pi * told.frequency[[0, -1]])
@@ -176,7 +178,7 @@ def _without_modes(told: Response) -> tuple[Array, Array]:
 
 def _with_mode(told: Response, best: _Solved) -> list[Array]:
     """Values with one mode more, where a linear step finds that one takes most."""
-    left = (told.plant - _sampled(best.values, told)) / told.spread
+    left = -_left(best.values, told)
     mass, late = float(np.exp(best.values[0])), best.values[3] * told.period
     tried = []
     for omega in 2.0 * np.pi * told.frequency[2:-2]:
@@ -187,13 +189,15 @@ def _with_mode(told: Response, best: _Solved) -> list[Array]:
             gain = met / float(np.real(np.vdot(shape, shape)))
             tried.append((gain * met, omega, damping, gain))
     tried.sort(reverse=True)
-    apart: list[tuple[float, float, float, float]] = []
-    for one in tried:
-        if all(abs(np.log(one[1] / other[1])) > 0.1 for other in apart):
-            apart.append(one)
-        if len(apart) == 2:
-            break
-    return [np.array([*best.values, np.log(w), np.log(z), c]) for _, w, z, c in apart]
+    first = tried[0]
+    apart = [one for one in tried if abs(np.log(one[1] / first[1])) > 0.1]
+    two = (first, *apart[:1])
+    return [np.array([*best.values, np.log(w), np.log(z), c]) for _, w, z, c in two]
+
+
+def _left(values: Array, told: Response) -> Complex:
+    """What these values leave of the response (k,), in its standard deviations."""
+    return np.asarray((_sampled(values, told) - told.plant) / told.spread)
 
 
 def _sampled(values: Array, told: Response) -> Complex:
@@ -238,7 +242,6 @@ def _grown(pole: complex, time: float) -> complex:
 
 def _read(found: Response, told: Response, best: _Solved) -> Plant:
     values, mass = best.values, float(np.exp(best.values[0]))
-    left = np.abs(_sampled(values, told) - told.plant) / told.spread
     return Plant(
         mass=best.banded(0),
         damping=best.banded(1, mass),
@@ -246,5 +249,5 @@ def _read(found: Response, told: Response, best: _Solved) -> Plant:
         delay=Banded(float(values[3]) * told.period, float(best.bands[3]) * told.period),
         modes=best.modes,
         fitted=_sampled(values, found),
-        misfit=float(np.sqrt(np.mean(left**2))),
+        misfit=float(np.sqrt(np.mean(np.abs(_left(values, told)) ** 2))),
     )
