@@ -60,7 +60,7 @@ from twin.logs import GivenLogs, Log, logs_by_name
 from twin.memory import trim_memory
 from twin.model.file import as_model
 from twin.model.machine import MachineModel
-from twin.mujoco.inertial import inertial
+from twin.mujoco.written import inertial
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
 

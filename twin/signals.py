@@ -109,6 +109,11 @@ def median(values: Array) -> float:
     return float(np.partition(within, middle)[middle].mean())
 
 
+def stretches(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """First sample, and the one after the last, of each stretch of true ones (n,); (k, 2)."""
+    return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)
+
+
 def white_noise(signal: Array) -> float:
     """RMS of the white part of a smooth signal (n,): its fourth difference holds little else.
 

@@ -29,7 +29,7 @@ from identify.estimation.intervals import CONFIDENCE
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
-from twin.signals import Array, usual_size
+from twin.signals import Array, stretches, usual_size
 
 TEST_FUNCTION = 0.02  # s, short enough for spikes of a few millimetres at 0.1 m/s
 STEADY = 0.05  # of the pass speed, by which the speed may differ on a pass
@@ -165,8 +165,7 @@ def find_spikes(found: Passes) -> tuple[Spike, ...]:
         rises = sides - sides @ smoother(found.position, _size(rises) < EDGE).T
     size = _size(rises)
     spikes = []
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], size > EDGE, [0]])))
-    for first, last in edges.reshape(-1, 2):
+    for first, last in stretches(size > EDGE):
         whole = first > 0 and last < len(size)  # a spike at the end is seen in part
         if whole and size[first:last].max() > OUTSTANDING:
             place, own = found.position[first:last], rises[:, first:last]

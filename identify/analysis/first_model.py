@@ -18,6 +18,7 @@ from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, bodie
 from identify.dataset.prepared_log import at_rest
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
+from identify.estimation.evidence import rms
 from twin.checks import moves
 from twin.effect import Excitation, Kind
 from twin.effects import Catalogue
@@ -25,7 +26,7 @@ from twin.errors import InputError
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
-from twin.signals import Array
+from twin.signals import Array, stretches
 
 LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
 BLOCKS = 30  # of time, for the scatter of a value
@@ -168,7 +169,7 @@ def _regressed(columns: Array, force: Array) -> Regression:
     scores = np.stack([part.sum(axis=1) for part in np.array_split(scaled * left, BLOCKS, axis=1)])
     variance = np.diag(inverse @ (scores.T @ scores) @ inverse)
     error = np.sqrt(np.maximum(variance, 0.0)) + ROUNDING * float(np.linalg.norm(force))
-    return Regression(gains / size, gains / error, float(np.sqrt(np.mean(left**2))))
+    return Regression(gains / size, gains / error, rms(left))
 
 
 def _static(
@@ -178,14 +179,13 @@ def _static(
     needed = []
     for m in motions:
         rest = at_rest(m.velocity)
-        edges = np.flatnonzero(np.diff(rest, prepend=False, append=False))
         driven = m.net - found.gains[0] * m.acceleration - found.gains[3]
         driven = driven - found.gains[4:] @ _of_place(m.position, place)
         driven = np.convolve(driven, np.ones(SMOOTHED) / SMOOTHED, "same")
         stood = max(round(STOOD / m.period), SMOOTHED)
         needed += [
             float(np.max(driven[last - stood : last] * np.sign(m.velocity[last])))
-            for first, last in zip(edges[::2], edges[1::2], strict=True)
+            for first, last in stretches(rest)
             if last - first >= stood and last < len(rest)
         ]
     return float(np.median(needed)) if len(needed) >= BREAKAWAYS else None

@@ -27,7 +27,7 @@ from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.model.units import AxisUnits
-from twin.signals import Array
+from twin.signals import Array, stretches
 
 USED = 0.5  # last part of a plateau, by time, that is averaged
 STEADY = 0.02  # of its velocity, by which a plateau's may change within one test function
@@ -107,10 +107,9 @@ def plateaus(motion: Motion) -> list[tuple[int, int]]:
     change = np.abs(window.acceleration(motion.velocity)) * window.length
     moving = np.abs(velocity) > STEADY * np.abs(motion.velocity).max()
     steady = moving & (change < STEADY * np.abs(velocity))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], steady, [0]])))
     blocks = [
         (int(first * window.stride) + len(window.weights), int((last - 1) * window.stride))
-        for first, last in edges.reshape(-1, 2)
+        for first, last in stretches(steady)
     ]
     return [(start, end) for start, end in blocks if end - start >= FEWEST]
 

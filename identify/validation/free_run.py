@@ -28,13 +28,12 @@ SEED = 0  # of the added noise
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
-    """Simulated minus measured position, axis -> (n,) m, with a restart every ``horizon`` s.
+    """Simulated minus measured position, axis -> (n,) m, with a restart every HORIZON s.
 
     begun: samples of the log before the run, which some axis leaves out.
     """
 
     error: dict[str, Array]
-    horizon: float
     begun: int = 0
 
 
@@ -82,17 +81,11 @@ def free_run(
         span = slice(start, end)
         simulated = open_loop(model, table, simulation, int(start), command[span])
         out[span] = simulated - position[span]
-    return FreeRun(
-        {a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, HORIZON, _begun(logs)
-    )
+    return FreeRun({a: out[:, i] for i, a in enumerate(model.axes) if a in logs}, _begun(logs))
 
 
 def drift_of_noise(model: MachineModel, logs: Mapping[str, PreparedLog], run: FreeRun) -> FreeRun:
-    """The drift that measurement noise alone causes in a free run on a log.
-
-    Noise of the measured command drives the free run as well, so even the exact model has this
-    error.
-    """
+    """The drift that noise of readings and command alone causes: the exact model has it as well."""
     noisy = free_run(model, logs, noise=np.random.default_rng(SEED))
     for axis, error in run.error.items():
         noisy.error[axis] -= error

@@ -13,6 +13,7 @@ from functools import reduce
 
 import numpy as np
 
+from identify.estimation.evidence import rms
 from twin.core.control import Controller
 from twin.core.loop import POSITION_COLUMN
 from twin.effect import Kind
@@ -81,8 +82,7 @@ def tracking(
     for name in names:
         axis, earlier = model.axes[name], before.axis(name) if before else None
         for effect in _named(axis, earlier):
-            less = _less(axis, effect, earlier)
-            variants[name, effect] = model.with_axis(name, less)
+            variants[name, effect] = model.with_axis(name, _less(axis, effect, earlier))
     models: list[MachineModel | None] = [None, before, model, *variants.values()]
     errors: list[dict[str, TrackingError]] = []
     for i, one in enumerate(models):
@@ -156,10 +156,7 @@ def _errors(
             i = _at(machine, name)
             found[name].append(motion.position[:, i] - done.signals[:, i, POSITION_COLUMN])
     every = {name: np.concatenate(parts) for name, parts in found.items()}
-    return {
-        name: TrackingError(float(np.sqrt(np.mean(e**2))), float(np.abs(e).max()))
-        for name, e in every.items()
-    }
+    return {name: TrackingError(rms(e), float(np.abs(e).max())) for name, e in every.items()}
 
 
 def _as_read(position: Array, bandwidth: float, sample_rate: float) -> Array:

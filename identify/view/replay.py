@@ -12,7 +12,7 @@ from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.alignment import aligned
 from identify.estimation.force_balance import effect_forces, residual
-from identify.validation.free_run import free_run
+from identify.validation.free_run import HORIZON, free_run
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
@@ -128,7 +128,7 @@ def _replay(model: MachineModel, log: Log, name: str, parts: Mapping[str, Prepar
     notes = still if parts else []
     if parts and run is None:
         notes.append("the motion is imposed, so that the model has none of its own")
-    horizon = run.horizon if run else 0.0
+    horizon = HORIZON if run else 0.0
     return Replay(name, model, cut.rate, begun * log.period, axes, horizon, tuple(notes))
 
 

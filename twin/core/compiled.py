@@ -42,13 +42,6 @@ class _Cache(FunctionCache):
         return (*super()._index_key(sig, codegen), digest(self._py_func))
 
 
-class _Callback(CFunc):
-    """A C callback with such a cache."""
-
-    def enable_caching(self):
-        self._cache = _Cache(self.__wrapped__)
-
-
 def compiled(*, inline: bool = False, nogil: bool = False) -> Callable[[Any], Any]:
     """Decorator: compile a function at its first call, and keep the machine code on disk."""
 
@@ -69,15 +62,14 @@ def callback(function: Any, signature: Any) -> Any:
     """
     for called in own_functions(function):
         _let_be_called(called)
-    out = _Callback(function, (signature.args, signature.return_type), {}, {"error_model": "numpy"})
-    out.enable_caching()
+    types_of = signature.args, signature.return_type
+    out: Any = CFunc(function, types_of, {}, {"error_model": "numpy"})
+    out._cache = _Cache(function)
     out.compile()
     return out
 
 
-@cache  # once each
-def _let_be_called(function: FunctionType) -> None:
-    register_jitable(function)
+_let_be_called = cache(register_jitable)  # once each
 
 
 @cache

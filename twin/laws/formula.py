@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from types import CodeType
 
 import numpy as np
 
@@ -44,11 +46,9 @@ def formula(equation: str, parameters: Collection[str]) -> Callable[[Mapping[str
     def computed(values: Mapping[str, Array]) -> Array:
         names = {**_FUNCTIONS, "pi": np.pi, **values}
         for _ in code:  # each may need those that are explained after it
-            for name, text in code.items():
-                try:
-                    names[name] = _value(text, names)
-                except NameError:
-                    continue
+            for name, meaning in code.items():
+                with suppress(NameError):
+                    names[name] = _value(meaning, names)
         try:
             return np.asarray(_value(whole, names), dtype=float)
         except NameError as error:
@@ -57,12 +57,12 @@ def formula(equation: str, parameters: Collection[str]) -> Callable[[Mapping[str
     return computed
 
 
-def _value(text: str, names: Mapping[str, object]) -> Array:
+def _value(code: CodeType, names: Mapping[str, object]) -> Array:
     """Of an expression that ``_python`` made of known names and operators alone."""
-    return eval(text, {"__builtins__": {}}, dict(names))
+    return eval(code, {"__builtins__": {}}, dict(names))
 
 
-def _python(text: str, known: Collection[str]) -> str:
+def _python(text: str, known: Collection[str]) -> CodeType:
     """The text as a Python expression; raises NoFormula for a word that is no known name."""
     out: list[str] = []
     at, bars, ended = 0, 0, False  # ended: whether what stands before is a value
@@ -83,12 +83,7 @@ def _python(text: str, known: Collection[str]) -> str:
         python = ")" if closes else "abs(" if token == "|" else _OPERATORS.get(token, token)
         out.append(python)
         ended = closes or token == ")" or (token[0].isalnum() and not called)
-    return _compiled(" ".join(out))
-
-
-def _compiled(text: str) -> str:
     try:
-        compile(text, "equation", "eval")
+        return compile(" ".join(out), "equation", "eval")
     except SyntaxError as error:
         raise NoFormula(text) from error
-    return text

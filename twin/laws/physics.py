@@ -13,7 +13,7 @@ import numpy as np
 from twin.effect import DRY, OUT, READING, STATIC, TIME, VISCOUS, Effect, Kind, U, V, X
 from twin.laws.checks import RESULTS, LawBroken, with_values
 from twin.laws.formula import NoFormula, formula
-from twin.laws.trials import Array, Motion, Values, companion, forces, moderate, of_kind, trace
+from twin.laws.trials import Motion, Values, acted, forces, moderate, of_kind, trace
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR, dimension
 
@@ -29,11 +29,9 @@ RATES_APART = 0.3
 def check_sample_rate(effect: Effect) -> None:
     """The same motion sampled four times as often leaves about the same force, or reading."""
     values = moderate(effect, np.random.default_rng(17))
-    slow, fast = (Motion.cycles(samples=round(rate)) for rate in RATES)
+    slow, fast = (acted(effect, values, Motion.cycles(samples=round(rate))) for rate in RATES)
     every = round(RATES[1] / RATES[0])
-    for one, all_of_other in zip(
-        _acted(effect, values, slow), _acted(effect, values, fast), strict=True
-    ):
+    for one, all_of_other in zip(slow, fast, strict=True):
         other = all_of_other[::every]
         apart, size = (float(np.sqrt(np.mean(r**2))) for r in (one - other, other))
         if not apart <= RATES_APART * size:
@@ -45,20 +43,11 @@ def check_sample_rate(effect: Effect) -> None:
             )
 
 
-def _acted(effect: Effect, values: Values, motion: Motion) -> list[Array]:
-    """What the effect does along a motion, (n,) each: for a modifier, to each friction."""
-    own = Fitted.at_start(effect, values)
-    if effect.kind is Kind.SENSING:
-        seen = trace(effect, values, motion)
-        return [(seen.after - seen.before)[:, READING]]
-    if effect.kind is not Kind.MODIFIER:
-        return [forces([own], motion)[effect.name]]
-    rows = []
-    for friction in of_kind(Kind.FRICTION):
-        alone = companion(friction)
-        changed = forces([alone, own], motion)[friction.name]
-        rows.append(changed - forces([alone], motion)[friction.name])
-    return rows
+def _work(effect: Effect, values: Values, motion: Motion, *around: Fitted) -> tuple[float, float]:
+    """What an effect gives along a motion beside others, N m, and what goes to and fro."""
+    force = forces([Fitted.at_start(effect, values), *around], motion)[effect.name]
+    power = force * motion.v
+    return np.sum(power) * motion.dt, np.sum(np.abs(power)) * motion.dt
 
 
 def check_takes_energy(effect: Effect) -> None:
@@ -79,10 +68,7 @@ def check_dissipative(friction: Effect, modifier: Effect | None = None) -> None:
         around = [[Fitted.at_start(modifier, moderate(modifier, rng, w))] for w in (0.3, 1e9)]
     for values in (friction.starts(), moderate(friction, rng)):
         for amplitude, changed in product(AMPLITUDES, around):
-            motion = Motion.cycles(amplitude)
-            force = forces([Fitted.at_start(friction, values), *changed], motion)[friction.name]
-            given = np.sum(force * motion.v) * motion.dt
-            size = np.sum(np.abs(force * motion.v)) * motion.dt
+            given, size = _work(friction, values, Motion.cycles(amplitude), *changed)
             if not given <= ROUNDING * size:
                 beside = f" under {modifier.name}" if modifier else ""
                 raise LawBroken(
@@ -105,9 +91,7 @@ def depends_on_position_alone(effect: Effect, values: Values) -> bool:
 
 def check_conservative(effect: Effect, values: Values) -> None:
     """No net work around a loop in position, whatever the speeds out and back."""
-    motion = Motion.cycles(0.15, cycles=1, samples=20_000)
-    power = forces([Fitted.at_start(effect, values)], motion)[effect.name] * motion.v
-    left, size = np.sum(power) * motion.dt, np.sum(np.abs(power)) * motion.dt
+    left, size = _work(effect, values, Motion.cycles(0.15, cycles=1, samples=20_000))
     if not np.abs(left) <= ROUNDING * size:
         raise LawBroken(f"work of {left:.3g} {WORK} is left around a loop in position")
 
@@ -201,9 +185,8 @@ def check_takes_speed(effect: Effect) -> None:
     driven = effect.reads("TIME") or effect.reads("U") or not effect.reads("V")
     if driven or not strengths or any(p.lower < 0.0 for p in strengths):
         return
-    values, motion = moderate(effect, np.random.default_rng(27)), Motion.cycles(0.15)
-    power = forces([Fitted.at_start(effect, values)], motion)[effect.name] * motion.v
-    given, size = np.sum(power) * motion.dt, np.sum(np.abs(power)) * motion.dt
+    values = moderate(effect, np.random.default_rng(27))
+    given, size = _work(effect, values, Motion.cycles(0.15))
     if not given <= 1e-3 * size:
         raise LawBroken(
             f"it gives {given:.3g} {WORK} in closed cycles of +-0.15 {LINEAR.position}, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
@@ -131,7 +131,7 @@ def compiled(effect: Effect, *arrays: Array) -> Callable[[], object]:
 
 def trace(effect: Effect, values: Values, motion: Motion, law: Callable | None = None) -> Trace:
     """Step the compiled law, or the one given, over a motion."""
-    given = np.array([values[p.name] for p in effect.parameters] + [_MARK])
+    given = np.array([*(values[p.name] for p in effect.parameters), _MARK])
     p, own = given.copy(), len(effect.states)
     s = np.concatenate([np.zeros(own), [_MARK]])
     io = np.zeros(IO_SIZE)
@@ -230,21 +230,31 @@ def moderate(effect: Effect, rng: np.random.Generator, wanted: float = 0.3) -> d
 
 def action(effect: Effect, values: Values) -> float:
     """RMS of what the effect does along closed cycles: N, or um of a reading."""
-    motion = Motion.cycles(samples=1000)
+    most = max(float(np.mean(row**2)) for row in acted(effect, values, _cycles()))
+    return float((1e6 if effect.kind is Kind.SENSING else 1.0) * np.sqrt(most))
+
+
+def acted(effect: Effect, values: Values, motion: Motion) -> list[Array]:
+    """What the effect does along a motion, (n,) each: for a modifier, to each friction."""
     own = Fitted.at_start(effect, values)
     if effect.kind is Kind.SENSING:
         seen = trace(effect, values, motion)
-        return float(1e6 * np.sqrt(np.mean((seen.after - seen.before)[:, READING] ** 2)))
+        return [(seen.after - seen.before)[:, READING]]
     if effect.kind is not Kind.MODIFIER:
-        return float(np.sqrt(np.mean(forces([own], motion)[effect.name] ** 2)))
-    changes = []
-    for friction in of_kind(Kind.FRICTION):
-        changed = forces([companion(friction), own], motion)[friction.name]
-        changes.append(np.mean((changed - _unmodified(friction)) ** 2))
-    return float(np.sqrt(max(changes)))
+        return [forces([own], motion)[effect.name]]
+    return [
+        forces([companion(friction), own], motion)[friction.name] - _unmodified(friction, motion)
+        for friction in of_kind(Kind.FRICTION)
+    ]
 
 
 @cache
-def _unmodified(friction: Effect) -> Array:
-    """The force of a friction by itself along the motion of ``action``, (n,) N."""
-    return forces([companion(friction)], Motion.cycles(samples=1000))[friction.name]
+def _cycles() -> Motion:
+    """The motion of ``action``."""
+    return Motion.cycles(samples=1000)
+
+
+@lru_cache(maxsize=32)  # along the motion of ``action`` it is asked for again and again
+def _unmodified(friction: Effect, motion: Motion) -> Array:
+    """The force of a friction by itself, (n,) N."""
+    return forces([companion(friction)], motion)[friction.name]

@@ -81,19 +81,9 @@ class AxisUnits:
         return "rotary" if self.rotary else "linear"
 
 
-LINEAR = AxisUnits(False, "m", "m/s", "m/s^2", "N", "kg", "mass")
-ROTARY = AxisUnits(
-    rotary=True,
-    position=rotary_unit(LINEAR.position),
-    velocity=rotary_unit(LINEAR.velocity),
-    acceleration=rotary_unit(LINEAR.acceleration),
-    force=rotary_unit(LINEAR.force),
-    mass=rotary_unit(LINEAR.mass),
-    mass_name="inertia",
-)
-
-
-_OF_A_ROTARY_AXIS = (ROTARY.position, ROTARY.velocity, ROTARY.acceleration, ROTARY.force)
+_SI = ("m", "m/s", "m/s^2", "N", "kg")
+LINEAR = AxisUnits(False, *_SI, "mass")
+ROTARY = AxisUnits(True, *map(rotary_unit, _SI), "inertia")
 
 
 def units_of(unit: str | None) -> AxisUnits:
@@ -101,7 +91,8 @@ def units_of(unit: str | None) -> AxisUnits:
 
     Linear where it is not known.
     """
-    return ROTARY if unit in _OF_A_ROTARY_AXIS else LINEAR
+    turning = (ROTARY.position, ROTARY.velocity, ROTARY.acceleration, ROTARY.force)
+    return ROTARY if unit in turning else LINEAR
 
 
 # Exponents of newton, metre and second.
@@ -116,8 +107,7 @@ def dimension(unit: str) -> tuple[int, int, int]:
     over, *under = unit.split("/")
     for sign, product in ((1, over), *((-1, part) for part in under)):
         for factor in _FACTOR.finditer(product):
-            own = _EXPONENTS.get(factor["symbol"], (0, 0, 0))
-            for i, exponent in enumerate(own):
+            for i, exponent in enumerate(_EXPONENTS.get(factor["symbol"], ())):
                 total[i] += sign * exponent * int(factor["power"] or 1)
     return total[0], total[1], total[2]
 

@@ -30,7 +30,7 @@ from twin.core.compiled import call_at, compiled
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import Driven, native_address, offsets, view, word_at
-from twin.mujoco.mjcf import read_spec
+from twin.mujoco.mjcf import add_motor, read_spec
 from twin.signals import Array
 
 CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
@@ -105,11 +105,13 @@ class Mechanism:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Name of the body that each axis moves, or of its joint where the body has none."""
-        joints = self.model.dof_jntid[self.places[1]]
-        return tuple(
-            self.model.body(self.model.jnt_bodyid[j]).name or self.model.joint(j).name
-            for j in joints
-        )
+        model = self.model
+        joints = model.dof_jntid[self.places[1]]
+        return tuple(model.body(model.jnt_bodyid[j]).name or model.joint(j).name for j in joints)
+
+    def _body(self, axis: int) -> int:
+        """Number of the body that an axis moves."""
+        return int(self.model.jnt_bodyid[self.model.dof_jntid[self.places[1, axis]]])
 
     def moved_by(self, axis: int) -> list[int]:
         """The axes whose forces the body of one changes: its own, and those that carry it."""
@@ -121,12 +123,11 @@ class Mechanism:
 
     def inertial(self, axis: int) -> Array:
         """The ten parameters of the body of an axis, as ``per_unit`` has them."""
-        model, turned = self.model, np.zeros(9)
-        body = model.jnt_bodyid[model.dof_jntid[self.places[1, axis]]]
+        model, turned, body = self.model, np.zeros(9), self._body(axis)
         mujoco.mju_quat2Mat(turned, model.body_iquat[body])
         axes, mass, centre = turned.reshape(3, 3), model.body_mass[body], model.body_ipos[body]
         own = axes @ np.diag(model.body_inertia[body]) @ axes.T
-        about = own + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        about = own + _of_point(mass, centre)
         return np.array([mass, *(mass * centre), *about.diagonal(), *about[np.triu_indices(3, 1)]])
 
     def per_unit(self, axis: int, *motion: Array) -> Array:
@@ -145,19 +146,21 @@ class Mechanism:
 
     def _with(self, axis: int, inertial: Array) -> Mechanism:
         """With the body of an axis of these parameters (10,)."""
-        model = copy(self.model)
-        body = model.jnt_bodyid[model.dof_jntid[self.places[1, axis]]]
+        model, body = copy(self.model), self._body(axis)
         mass, centre = inertial[0], inertial[1:4] / inertial[0]
         xx, yy, zz, xy, xz, yz = inertial[4:]
         about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        moments, turned = np.linalg.eigh(
-            about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        )
+        moments, turned = np.linalg.eigh(about - _of_point(mass, centre))
         turned[:, 0] *= np.sign(np.linalg.det(turned))
         mujoco.mju_mat2Quat(model.body_iquat[body], turned.ravel())
         model.body_mass[body], model.body_ipos[body] = mass, centre
         model.body_inertia[body], model.body_sameframe[body] = moments, 0
         return replace(self, model=model)
+
+
+def _of_point(mass: float, place: Array) -> Array:
+    """Inertia (3, 3) kg m^2 of a point about the origin."""
+    return np.asarray(mass * (place @ place * np.eye(3) - np.outer(place, place)))
 
 
 def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:
@@ -188,10 +191,7 @@ def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mec
 
 
 def _require_measured(
-    model: mujoco.MjModel,
-    name: str,
-    joints: Sequence[tuple[str, str]],
-    found: Collection[str],
+    model: mujoco.MjModel, name: str, joints: Sequence[tuple[str, str]], found: Collection[str]
 ) -> None:
     used: dict[str, str] = {}
     for axis, joint in joints:
@@ -278,10 +278,7 @@ def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
         _strip(joint)
         joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
         joint.armature = own.weighed.mass - own.mass
-        motor = spec.add_actuator(
-            name=f"motor_{axis}", target=own.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        motor.gear[0] = 1.0
+        add_motor(spec, axis, own.joint or axis)
     return spec
 
 

@@ -169,13 +169,13 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     carried: dict[str, float] = {}
     for name in reversed(list(model.axes)):
-        joint = spec.joint(name)
-        if joint is None or spec.actuator(f"motor_{name}") is None:
+        joint, motor = spec.joint(name), spec.actuator(f"motor_{name}")
+        if joint is None or motor is None:
             raise InputError(
                 f"{model.mjcf_name}: has no joint '{name}' with a motor 'motor_{name}'; "
                 "an axis needs both"
             )
-        _require_bare(model, name, joint, spec.actuator(f"motor_{name}"))
+        _require_bare(model, name, joint, motor)
         if model.axes[name].rotary:
             carried[name] = _set_inertia(model, spec, name)
             continue
@@ -193,6 +193,12 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
                 joint_name = attached_joint(name, f.effect.name)
                 f.effect.attach(Mount(spec, name, joint_name, axis.mass, axis.rotary), f.values)
     return spec
+
+
+def add_motor(spec: mujoco.MjSpec, axis: str, joint: str) -> None:
+    """Add the motor of an axis: its command is the force on the joint."""
+    kind = mujoco.mjtTrn.mjTRN_JOINT
+    spec.add_actuator(name=f"motor_{axis}", target=joint, trntype=kind).gear[0] = 1.0
 
 
 def attached_joint(axis: str, effect: str) -> str:
@@ -274,8 +280,5 @@ def _plain_joints(model: MachineModel) -> mujoco.MjSpec:
         body = frame.add_body(name=name)
         body.add_joint(name=name, type=JOINTS[axis.rotary], axis=DIRECTIONS[i % len(DIRECTIONS)])
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
-        motor = spec.add_actuator(
-            name=f"motor_{name}", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        motor.gear[0] = 1.0
+        add_motor(spec, name, name)
     return spec

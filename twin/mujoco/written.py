@@ -1,4 +1,4 @@
-"""The user's MuJoCo file with something changed in it; its order and comments stay as they are."""
+"""What is written into the user's MuJoCo file, whose order and comments stay as they are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.errors import InputError
-from twin.mujoco.mechanism import mechanism_of, read_bodies
 from twin.signals import Array
 
 _TAG = re.compile(
@@ -22,9 +21,18 @@ def in_mjcf(text: str, name: str) -> str:
     """The text itself, or what a URDF text is in MJCF."""
     if "<mujoco" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).lstrip()[:200]:
         return text
+    from twin.mujoco.mechanism import read_bodies  # MuJoCo takes long to load
+
     spec = read_bodies(text, name)
     spec.compile()
     return str(spec.to_xml())
+
+
+def inertial(mass: float, centre: Array, inertia: Array) -> str:
+    """The element of a body of that mass kg, centre (3,) m and inertia (3, 3) kg m^2 about it."""
+    full = [*inertia.diagonal(), *inertia[[0, 0, 1], [1, 2, 2]]]
+    pos, fullinertia = (" ".join(f"{v:.6g}" for v in values) for values in (centre, full))
+    return f'<inertial mass="{mass:.6g}" pos="{pos}" fullinertia="{fullinertia}"/>'
 
 
 def with_joint(text: str, joint: str, attributes: Mapping[str, float]) -> str:
@@ -53,6 +61,8 @@ def with_inertial(
     name: of the file, for messages. joints: of all axes. wanted (10,): the body's parameters, as
     ``Mechanism.inertial`` has them. Raises InputError where the file takes them from elsewhere.
     """
+    from twin.mujoco.mechanism import mechanism_of
+
     place = _place_of(text, joints[axis])
     made = text if place is None else text[: place[0]] + element + text[place[1] :]
     mechanism = mechanism_of(made, name, joints)

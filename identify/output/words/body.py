@@ -8,7 +8,7 @@ from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.results.addition import CorrectedBody
 from identify.results.results import Diagnosis
 from twin.model.machine import MachineModel
-from twin.mujoco.inertial import inertial
+from twin.mujoco.written import inertial
 
 
 def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:

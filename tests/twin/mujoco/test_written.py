@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from twin.errors import InputError
-from twin.mujoco.inertial import inertial
-from twin.mujoco.written import in_mjcf, with_inertial
+from twin.mujoco.written import in_mjcf, inertial, with_inertial
 
 JOINTS = {"one": "a", "two": "b"}
 FILE = """<mujoco>
