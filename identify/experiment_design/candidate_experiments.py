@@ -106,10 +106,7 @@ def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -
 
 
 def _scale(axis: AxisModel) -> float:
-    """Of the lengths and speeds of a stage, for an axis whose travel is known: rad a metre.
-
-    Angles are as large a part of the travel, or as the encoder asks for to see the shortest.
-    """
+    """Of a stage's lengths and speeds, rad a metre: for as large a part of the travel, or seen."""
     h = axis.hardware
     if not axis.rotary or h.travel is None:
         return 1.0

@@ -65,21 +65,17 @@ def explained(
 
 
 def _supposed(effect: Effect, axis: AxisModel, dataset: Dataset) -> AxisModel:
-    """The axis with the effect at start values and a force above the noise floor.
-
-    A friction is fitted to the dataset instead, as it replaces the friction of the axis.
-    """
-    if effect.kind is Kind.FRICTION:
+    """The axis with the effect at start values and a force above the noise floor."""
+    if effect.kind is Kind.FRICTION:  # fitted, as it replaces the friction of the axis
         first = start_values(fit_axis(axis, dataset.fit), dataset, effect)[0]
         return fit_axis(axis.with_effect(first.fitted), dataset.fit).axis
-    floor = floor_of(axis, dataset.fit)
     without = residual(axis, dataset.fit)
 
     def added(fitted: Fitted) -> Array:
         return residual(axis.with_effect(fitted), dataset.fit) - without
 
-    starts = effect.starts(dataset.excitation)
-    return axis.with_effect(strength_for(effect, added, STRENGTH * floor, starts))
+    force, starts = STRENGTH * floor_of(axis, dataset.fit), effect.starts(dataset.excitation)
+    return axis.with_effect(strength_for(effect, added, force, starts))
 
 
 def differing_axis(rivals: Sequence[Rival], machine: MachineModel) -> str:

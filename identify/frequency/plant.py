@@ -242,6 +242,7 @@ def _grown(pole: complex, time: float) -> complex:
 
 def _read(found: Response, told: Response, best: _Solved) -> Plant:
     values, mass = best.values, float(np.exp(best.values[0]))
+    left = np.abs(_sampled(values, told) - told.plant) / told.spread
     return Plant(
         mass=best.banded(0),
         damping=best.banded(1, mass),
@@ -249,5 +250,5 @@ def _read(found: Response, told: Response, best: _Solved) -> Plant:
         delay=Banded(float(values[3]) * told.period, float(best.bands[3]) * told.period),
         modes=best.modes,
         fitted=_sampled(values, found),
-        misfit=float(np.sqrt(np.mean(np.abs(_left(values, told)) ** 2))),
+        misfit=float(np.sqrt(np.mean(left**2))),
     )

@@ -117,12 +117,19 @@ def check_units(effect: Effect) -> None:
     Where it is not, a parameter is in another unit than stated, or the law holds a number that has
     a unit of its own.
     """
-    values, motion = moderate(effect, np.random.default_rng(23)), _quiet()
+    values = moderate(effect, np.random.default_rng(23))
+    motion = Motion.random(np.random.default_rng(24))
+    # Without the tiniest speeds, at which a guard against zero may act.
+    motion = replace(motion, v=np.where(np.abs(motion.v) < 1e-5, 0.0, motion.v))
     found = trace(effect, values, motion).after
     turning = effect.suits is not None and not effect.suits([], False)
     for units in OTHER_UNITS[turning:]:  # on a rotary axis alone x is an angle, without a unit
         converted = {p.name: values[p.name] * _factor(p.unit, units) for p in effect.parameters}
-        other = trace(effect, converted, _in_units(motion, units)).after
+        force, length, time = units
+        scaled = Motion(
+            motion.dt * time, motion.x * length, motion.v * length / time, motion.u * force
+        )
+        other = trace(effect, converted, scaled).after
         for slot in RESULTS[effect.kind]:
             wanted = found[:, slot] * _factor(_RESULT_UNITS[slot], units)
             off, size = np.abs(other[:, slot] - wanted).max(), np.abs(wanted).max()
@@ -135,19 +142,8 @@ def check_units(effect: Effect) -> None:
                 )
 
 
-def _quiet() -> Motion:
-    """Random motion without the tiniest speeds, at which a guard against zero may act."""
-    motion = Motion.random(np.random.default_rng(24))
-    return replace(motion, v=np.where(np.abs(motion.v) < 1e-5, 0.0, motion.v))
-
-
 def _factor(unit: str, units: tuple[float, float, float]) -> float:
     return float(np.prod([u**k for u, k in zip(units, dimension(unit), strict=True)]))
-
-
-def _in_units(motion: Motion, units: tuple[float, float, float]) -> Motion:
-    force, length, time = units
-    return Motion(motion.dt * time, motion.x * length, motion.v * length / time, motion.u * force)
 
 
 def check_equation(effect: Effect) -> None:

@@ -23,7 +23,7 @@ from twin.model.units import LINEAR, ROTARY, AxisUnits
 if TYPE_CHECKING:
     from twin.mujoco.mechanism import Joint
 
-# Of a linear axis; ``hardware_unit`` gives those of any.
+# Of a linear axis, and what the entry is where that helps.
 HARDWARE_UNITS = {
     "travel": "m",
     "force_constant": "N/A",
@@ -36,12 +36,6 @@ HARDWARE_UNITS = {
     "jerk": "m/s^3, fastest move",
     "bandwidth": "Hz, position loop",
 }
-
-
-def hardware_unit(key: str, units: AxisUnits) -> str:
-    """Unit of a hardware entry on an axis with these units, and what it is where that helps."""
-    unit, comma, meaning = HARDWARE_UNITS[key].partition(",")
-    return f"{units(unit)}{comma}{meaning}"
 
 
 def models_folder() -> Path:
@@ -84,8 +78,14 @@ def load_model(name: str | Path, catalogue: Catalogue | None = None) -> MachineM
     """
     path = find_model(name)
     catalogue = load_catalogue() if catalogue is None else catalogue
-    entries = _checked(read_toml(path), str(path))
-    mjcf = _read_beside(path, entries.mujoco) if entries.mujoco else None
+    entries, mjcf = _checked(read_toml(path), str(path)), None
+    if beside := entries.mujoco:
+        folders = [f for f in (path.parent, models_folder()) if (f / beside).is_file()]
+        if not folders:
+            raise InputError(
+                f"{path}: mujoco = '{beside}' is not beside it; copy the MJCF file there"
+            )
+        mjcf = read_mjcf(folders[0] / beside)
     return _model(entries, catalogue, mjcf, str(path))
 
 
@@ -99,13 +99,6 @@ def as_model(given: MachineModel | str | Path, catalogue: Catalogue | None = Non
             "of its file or the name of one of the package, such as 'proton_xy'"
         )
     return load_model(given, catalogue)
-
-
-def _read_beside(path: Path, name: str) -> str:
-    for folder in (path.parent, models_folder()):
-        if (folder / name).is_file():
-            return read_mjcf(folder / name)
-    raise InputError(f"{path}: mujoco = '{name}' is not beside it; copy the MJCF file there")
 
 
 def read_mjcf(path: Path) -> str:
@@ -234,9 +227,8 @@ def format_model(model: MachineModel) -> str:
     if model.history:
         steps = tomlkit.aot()
         for step in model.history:
-            steps.append(
-                tomlkit.item({k: v for k, v in asdict(step).items() if v is not None and v != ()})
-            )
+            told = {k: v for k, v in asdict(step).items() if v is not None and v != ()}
+            steps.append(tomlkit.item(told))
         document["history"] = steps
     return tomlkit.dumps(document)
 
@@ -250,12 +242,12 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
         table[mass.name] = tomlkit.item(axis.mass).comment(f"{units(mass.unit)}, {mass.meaning}")
         if axis.mass_fixed:
             table["fixed"] = [mass.name]
-    for key in HARDWARE_UNITS:
+    for key, known in HARDWARE_UNITS.items():
         value = getattr(axis.hardware, key)
         if value is not None:
-            table[key] = tomlkit.item(list(value) if key == "travel" else value).comment(
-                hardware_unit(key, units)
-            )
+            unit, comma, meaning = known.partition(",")
+            item = tomlkit.item(list(value) if key == "travel" else value)
+            table[key] = item.comment(f"{units(unit)}{comma}{meaning}")
     effects = tomlkit.table(is_super_table=True)
     for fitted in axis.effects:
         entry = tomlkit.table()

@@ -263,13 +263,10 @@ class AxisModel:
 
         A friction takes the place of the friction that was there.
         """
-        friction = new.effect.kind is Kind.FRICTION
-        kept = tuple(
-            f
-            for f in self.effects
-            if f.effect.name != new.effect.name
-            and not (friction and f.effect.kind is Kind.FRICTION)
-        )
+        replaced = {new.effect.name}
+        if new.effect.kind is Kind.FRICTION and self.friction:
+            replaced.add(self.friction.effect.name)
+        kept = (f for f in self.effects if f.effect.name not in replaced)
         return replace(self, effects=(*kept, new))
 
     def without(self, effect: str) -> AxisModel:

@@ -81,9 +81,8 @@ class AxisUnits:
         return "rotary" if self.rotary else "linear"
 
 
-_SI = ("m", "m/s", "m/s^2", "N", "kg")
-LINEAR = AxisUnits(False, *_SI, "mass")
-ROTARY = AxisUnits(True, *map(rotary_unit, _SI), "inertia")
+LINEAR = AxisUnits(False, "m", "m/s", "m/s^2", "N", "kg", "mass")
+ROTARY = AxisUnits(True, "rad", "rad/s", "rad/s^2", "N m", "kg m^2", "inertia")
 
 
 def units_of(unit: str | None) -> AxisUnits:

@@ -207,10 +207,7 @@ def attached_joint(axis: str, effect: str) -> str:
 
 
 def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
-    """Give the body of a rotary axis its moment of inertia about the hinge; its mass, kg.
-
-    Raises InputError where the hinge carries another axis.
-    """
+    """Give the body of a rotary axis its moment of inertia about the hinge; its mass, kg."""
     axis, joint = model.axes[name], spec.joint(name)
     for other in model.axes:
         if _carries(joint.parent, other):
@@ -239,10 +236,7 @@ def read_spec(text: str, name: str) -> mujoco.MjSpec:
 def _require_bare(
     model: MachineModel, axis: str, joint: mujoco.MjsJoint, motor: mujoco.MjsActuator
 ) -> None:
-    """Friction, damping and springs belong in the machine model, where both simulations see them.
-
-    The joint must be of the axis' kind.
-    """
+    """Require a joint of the axis' kind, without what belongs in the machine model, and gear 1."""
     units = model.axes[axis].units
     if joint.type != JOINTS[units.rotary]:
         wanted = "hinge" if units.rotary else "slide"
