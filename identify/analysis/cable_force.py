@@ -91,11 +91,6 @@ class Passes:
         """(p, k) N, the force of position by pairs of passes: -(F_pos + F_neg)/2."""
         return -0.5 * (self.forwards + self.backwards)
 
-    @property
-    def turning(self) -> Array:
-        """(p, k) N, what opposes the motion either way: (F_pos - F_neg)/2."""
-        return 0.5 * (self.forwards - self.backwards)
-
 
 def _each_way(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[list[tuple[Array, Array]]]:
     """Position m and force N of the passes forwards, and of those backwards, by rising position.

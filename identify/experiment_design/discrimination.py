@@ -187,7 +187,6 @@ def contest(
 def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> SimulatedExperiment:
     """The evidence against the nearest rival, for the explanation that makes it smallest."""
     logs = arena.logs_with(motion)
-    new = logs[-1]
     axes = [e.axis for e in arena.explanations]
     kept = moving(logs, any(map(sticks, axes)))
     answers = [answer[kept] for answer in arena.answers(logs)]
@@ -201,7 +200,7 @@ def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> Sim
         found.append((evidence(np.hypot(noise, left), noise, added).delta_bic, left))
     gain, left = min(found, key=lambda pair: pair[0])
     where, quiet = (_on_last(values**2, kept, logs) for values in (left, noise))
-    return _simulated(experiment, new, gain, where, float(np.sqrt(where.mean())), quiet)
+    return _simulated(experiment, logs[-1], gain, where, float(np.sqrt(where.mean())), quiet)
 
 
 def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> SimulatedExperiment:
@@ -213,7 +212,6 @@ def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> Simula
     axis = arena.explanations[0].axis
     where = free_parameters(axis)
     logs = arena.logs_with(motion)
-    new = logs[-1]
     kept = moving(logs, sticks(axis))
     noise = residual(axis, logs)[kept]
     prior = np.maximum(np.abs(read(axis, where)), [abs(c.parameter.start) for c in where])
@@ -223,7 +221,7 @@ def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> Simula
     leverage = np.sum(columns * np.linalg.solve(information, columns.T).T, axis=1)
     gain = 0.5 * float(np.linalg.slogdet(information)[1])
     seen, quiet = (_on_last(values, kept, logs) for values in (leverage, noise**2))
-    return _simulated(experiment, new, gain, seen, np.nan, quiet)
+    return _simulated(experiment, logs[-1], gain, seen, np.nan, quiet)
 
 
 def _simulated(

@@ -189,9 +189,8 @@ def _spectrum(axis: AxisModel, log: PreparedLog, noise: Noise) -> tuple[Array, A
     frequency = np.asarray(np.fft.rfftfreq(segment, period), dtype=float)
     ratio = round(period / motion.sample_period)
     passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
-    passed_band = (passed > LEAST_PASSED) & (frequency > 0.0)
-    frequency = frequency[passed_band]
-    error, explain = power[:, passed_band] / passed[passed_band]
+    kept = (passed > LEAST_PASSED) & (frequency > 0.0)
+    frequency, (error, explain) = frequency[kept], power[:, kept] / passed[kept]
     return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
 
 

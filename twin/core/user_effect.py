@@ -76,7 +76,11 @@ def require_sound(effect: Effect, path: Path) -> None:
     At usual speeds it must give a finite number and some result; over a wide range of motion its
     indices must stay within their arrays.
     """
-    values = [_tried(p.start, p.lower, p.upper, p.strength) for p in effect.parameters]
+    # The start value, or a small strength where the effect is absent at the start.
+    values = [
+        p.start if p.start or not p.strength else min(max(0.1, p.lower), p.upper)
+        for p in effect.parameters
+    ]
     p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
     acted = False
     for k, sample in enumerate([*map(_at_speed, SPEEDS), *_anywhere()]):
@@ -108,11 +112,6 @@ def require_sound(effect: Effect, path: Path) -> None:
             f"{RESULT[effect.kind]}"
         )
     law_address(effect)
-
-
-def _tried(start: float, lower: float, upper: float, strength: bool) -> float:
-    """The start value, or a small strength where the effect is absent at the start."""
-    return start if start or not strength else min(max(0.1, lower), upper)
 
 
 def _at_speed(speed: float) -> list[float]:

