@@ -32,21 +32,28 @@ def _quantity(unit: str, meaning: str, *, zero: bool = False, most: float = 1e12
     return Field(None, **bounds, description=f"{least}, in {units}: {meaning}")
 
 
-def _none_or_from(least: float) -> AfterValidator:
+def _moved(unit: str, what: str, force: str) -> Any:
     """A moved mass: 0, of an axis whose motion is imposed, or a number from the least one."""
+    return Field(
+        None, ge=0.0, le=MOST,
+        description=f"a number from {LEAST:g} to {MOST:g}, in {unit}: the {what}; or 0, where the "
+        f"motion is imposed and the {force} that it takes was measured",
+    )  # fmt: skip
 
-    def check(mass: float) -> float:
-        if 0.0 < mass < least:
-            raise ValueError
-        return mass
 
-    return AfterValidator(check)
+def _imposed_or_heavy(mass: float) -> float:
+    if 0.0 < mass < LEAST:
+        raise ValueError
+    return mass
 
 
 def _ordered(travel: tuple[float, float]) -> tuple[float, float]:
     if not travel[0] < travel[1]:
         raise ValueError
     return travel
+
+
+Moved = Annotated[float, AfterValidator(_imposed_or_heavy)]
 
 
 class EffectEntry(Entries):
@@ -62,16 +69,8 @@ class EffectEntry(Entries):
 class AxisEntry(Entries):
     """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
 
-    mass: Annotated[float, _none_or_from(LEAST)] | None = Field(
-        None, ge=0.0, le=MOST,
-        description=f"a number from {LEAST:g} to {MOST:g}, in kg: the moved mass; or 0, "
-        "where the motion is imposed and the force that it takes was measured",
-    )  # fmt: skip
-    inertia: Annotated[float, _none_or_from(LEAST)] | None = Field(
-        None, ge=0.0, le=MOST,
-        description=f"a number from {LEAST:g} to {MOST:g}, in kg m^2: the moment of "
-        "inertia; or 0, where the motion is imposed and the torque that it takes was measured",
-    )  # fmt: skip
+    mass: Moved | None = _moved("kg", "moved mass", "force")
+    inertia: Moved | None = _moved("kg m^2", "moment of inertia", "torque")
     joint: str | None = Field(
         None, min_length=1, max_length=200,
         description="the name of a hinge or slide joint of the MJCF or URDF file, whose bodies the "
