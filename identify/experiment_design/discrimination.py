@@ -148,8 +148,8 @@ def require_within_limits(machine: MachineModel, log: Log) -> None:
     for name, axis in machine.axes.items():
         if np.abs(log.axes[name].force).max() >= axis.hardware.force_limit:
             raise CannotRun(
-                f"axis {name} reaches its force_limit of {axis.hardware.force_limit:g} N; move "
-                "more gently, or check the limit"
+                f"axis {name} reaches its force_limit of {axis.hardware.force_limit:g} "
+                f"{axis.units.force}; move more gently, or check the limit"
             )
 
 
