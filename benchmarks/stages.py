@@ -21,6 +21,7 @@ from benchmarks.workload import AXIS, Workload, saved
 from identify import workflow
 from identify.estimation.variable_projection import absent_effects
 from identify.output.report import write_report
+from identify.output.report.subject import Subject
 from identify.selection import diagnosis
 from identify.selection.trying import try_effect
 from twin.core.compiled import law_address
@@ -59,9 +60,7 @@ def _stages(work: Workload, name: str, files: list[Path]) -> list[Figure]:
     result = _diagnosed(work, logs, spent)
     with TemporaryDirectory() as folder:
         out = Path(folder, "report.html")
-        _timed(spent, "report", write_report)(
-            out, title="", diagnosis=result, comparison=result.comparison, history=()
-        )
+        _timed(spent, "report", write_report)(out, Subject("", result, result.comparison))
     return [
         Figure(
             f"{name} hidden: {stage}", work.in_passes(sum(seconds)), "passes",

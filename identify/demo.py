@@ -14,7 +14,9 @@ from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
 from identify.output.numbers import quantity
-from identify.output.report import Source, write_report
+from identify.output.report import write_report
+from identify.output.report.subject import Subject
+from identify.output.words.commands import Source
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis, Feedforward, OnMachine
 from twin.effect import Effect, Kind
@@ -98,16 +100,12 @@ def demo(
         say(_followed(worth, addition.step.axis))
     save_model(final, folder / BETTER)
     report = folder / "report.html"
-    write_report(
-        report,
-        title=f"{model.name}: what the model lacks",
-        diagnosis=diagnosis,
-        comparison=diagnosis.comparison,
-        history=final.history,
-        additions=[addition] if addition else [],
-        on_machine=OnMachine(worth=worth),
-        source=Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
-    )
+    subject = Subject(
+        f"{model.name}: what the model lacks", diagnosis, diagnosis.comparison, final.history,
+        [addition] if addition else [],
+        Source(f"twin demo -o {folder} --seed {seed}", model.name, folder), OnMachine(worth=worth),
+    )  # fmt: skip
+    write_report(report, subject)
     return Demo(hidden, diagnosis, addition, worth, report)
 
 

@@ -59,14 +59,9 @@ class Case:
         )  # fmt: skip
 
     def write(self, path: Path, **changes: object) -> str:
-        arguments = {
-            "title": "Report",
-            "diagnosis": self.diagnosis,
-            "comparison": self.diagnosis.comparison,
-            "history": self.addition.model.history,
-            "additions": [self.addition],
-        }
-        write_report(path, **(arguments | changes))  # type: ignore[arg-type]
+        said = {name: changes.pop(name) for name in ("assumed", "faults") if name in changes}
+        subject = replace(self.subject(self.diagnosis), **changes)  # type: ignore[arg-type]
+        write_report(path, subject, **said)  # type: ignore[arg-type]
         return path.read_text(encoding="utf-8")
 
 

@@ -176,14 +176,15 @@ def _report(
 ) -> None:
     """Write a report; findings: on the logs."""
     from identify.output.report import write_report
+    from identify.output.report.subject import Subject
 
+    history = (diagnosis or comparison).model.history
     write_report(
-        out, title=title, diagnosis=diagnosis, comparison=comparison,
-        history=(diagnosis or comparison).model.history,
+        out,
+        Subject(title, diagnosis, comparison, history, source=source, machine=known),
         assumed=[line for line in findings if "the import map assumes" in line],
         faults=[line for line in findings if ": error: " in line],
-        source=source, on_machine=known,
-    )  # fmt: skip
+    )
 
 
 @app.command()

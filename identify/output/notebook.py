@@ -25,7 +25,7 @@ SHOWN = ("answer", "found", "regions", "parameters", "logs")  # sections of a re
 def _subject(result: Diagnosis | Comparison) -> Subject:
     diagnosis = result if isinstance(result, Diagnosis) else None
     comparison = result.comparison if isinstance(result, Diagnosis) else result
-    return Subject("", diagnosis, comparison, (), ())
+    return Subject("", diagnosis, comparison)
 
 
 def tables(result: Diagnosis | Comparison) -> str:

@@ -14,12 +14,8 @@ from identify.output.report.explorer import explored
 from identify.output.report.page import Answer, Block, Heading, Part, Section
 from identify.output.report.page import page as whole_page
 from identify.output.report.subject import Subject
-from identify.output.words.commands import UNKNOWN, Source
-from identify.results.addition import Addition
-from identify.results.results import UNTOLD, Comparison, Diagnosis, OnMachine
 from twin.files import require_writable, write_atomically
 from twin.model.file import format_model
-from twin.model.machine import HistoryStep
 
 SECTIONS = (
     Part("answer", "Answer", answer.cards),
@@ -39,32 +35,22 @@ SECTIONS = (
 
 
 def write_report(
-    path: Path,
-    *,
-    title: str,
-    diagnosis: Diagnosis | None,
-    comparison: Comparison,
-    history: Sequence[HistoryStep],
-    additions: Sequence[Addition] = (),
-    assumed: Sequence[str] = (),
-    source: Source = UNKNOWN,
-    faults: Sequence[str] = (),
-    on_machine: OnMachine = UNTOLD,
+    path: Path, subject: Subject, assumed: Sequence[str] = (), faults: Sequence[str] = ()
 ) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
 
     assumed, faults: findings of the log check on what import maps assume, and its errors, said
-    first. source: what the page was made of. on_machine: what the model says of its loop.
+    first.
 
     One HTML file without outside references: styles, scripts and signals are inside. It appears
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    subject = Subject(title, diagnosis, comparison, history, additions, source, on_machine)
     warnings = [("Not confirmed", line) for line in assumed] + [("Fault", line) for line in faults]
     text = whole_page(
-        title, facts(subject), sections(subject), explored(subject), origin(subject), warnings
-    )
+        subject.title, facts(subject), sections(subject), explored(subject), origin(subject),
+        warnings,
+    )  # fmt: skip
     write_atomically(path, text.encode("utf-8"))
 
 
@@ -105,9 +91,8 @@ def origin(subject: Subject) -> list[tuple[str, str]]:
     if subject.source.command:
         shown.append(("Command", subject.source.command))
     shown.append(("Model, sha256", hashlib.sha256(format_model(model).encode()).hexdigest()))
-    for name in (name for names in subject.logs.values() for name in names):
-        shown.append((f"{name}, sha256", _digest(subject.source.folder / name)))
-    return shown
+    every = [name for names in subject.logs.values() for name in names]
+    return shown + [(f"{n}, sha256", _digest(subject.source.folder / n)) for n in every]
 
 
 def _digest(path: Path) -> str:
@@ -116,6 +101,3 @@ def _digest(path: Path) -> str:
         return "given in memory, not as a file"
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-__all__ = ["Source", "write_report"]

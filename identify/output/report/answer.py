@@ -7,31 +7,25 @@ from identify.links import WrongBody
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.addition import also_chose_in_words, errors_of_step, proved_in_words
 from identify.output.words.body import body_in_words
 from identify.output.words.commands import Source
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
-from identify.results.addition import Addition
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from twin.model.machine import HistoryStep
 
 
 def cards(view: AxisView) -> list[Block]:
-    """The card of an axis; before it, where nothing was diagnosed, one for its latest addition.
-
-    Before the first one that of a body, where one is not as its file has it.
-    """
+    """The card of an axis; before the first that of a body which is not as its file has it."""
     diagnosis = view.subject.diagnosis
-    if diagnosis and view.found and view.summary and view.said:
-        first = diagnosis.body if view.name == view.subject.views[0].name else None
-        own = _diagnosed(view, diagnosis, view.found, view.summary, view.said)
-        return [*([_body(diagnosis, first, view.subject.source)] if first else []), own]
-    added = [a for a in view.subject.additions if a.step.axis == view.name]
-    return [*(_added(a) for a in added[-1:]), _compared(view)]
+    if not (diagnosis and view.found and view.summary and view.said):
+        return [_compared(view)]
+    own = _diagnosed(view, diagnosis, view.found, view.summary, view.said)
+    if diagnosis.body is None or view is not view.subject.views[0]:
+        return [own]
+    return [_body(diagnosis, diagnosis.body, view.subject.source), own]
 
 
 def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> Answer:
@@ -106,12 +100,13 @@ def _position_tile(view: AxisView, model: str) -> list[Tile]:
 
 def _compared(view: AxisView) -> Answer:
     axis, unit = view.axis, view.units.force
-    at_floor, ratio = axis.ratio < RULE.at_floor, number(axis.ratio)
-    if at_floor:
+    ratio, tone = number(axis.ratio), Tone.STRONG
+    headline = view.words(f"force error {ratio} times the noise floor")
+    sentence = "is larger than noise explains; twin diagnose finds which effect is missing."
+    commands = [view.subject.command("twin diagnose MODEL LOG... -o diagnosis.html")]
+    if axis.ratio < RULE.at_floor:
         headline, sentence = "the model explains the measurement", "is at its noise floor."
-    else:
-        headline = view.words(f"force error {ratio} times the noise floor")
-        sentence = "is larger than noise explains; twin diagnose finds which effect is missing."
+        commands, tone = [], Tone.PLAIN
     error, floor = quantity(axis.total_error, unit), quantity(axis.floor, unit)
     return Answer(
         headline=f"Axis {view.name}: {headline}",
@@ -122,37 +117,9 @@ def _compared(view: AxisView) -> Answer:
             *_position_tile(view, ""),
         ],
         remarks=[],
-        tone=Tone.PLAIN if at_floor else Tone.STRONG,
-        commands=[]
-        if at_floor
-        else [view.subject.command("twin diagnose MODEL LOG... -o diagnosis.html")],
+        tone=tone,
+        commands=commands,
     )
-
-
-def _added(addition: Addition) -> Answer:
-    step, unit, words = addition.step, addition.units.position, addition.units.words
-    tiles = [
-        Tile(words(f"Force error, {role.value} logs"), arrow(before, after, step.unit), "RMS")
-        for role, (before, after) in errors_of_step(step).items()
-    ]
-    if addition.position_error and addition.replayed is not None:
-        replayed = f"RMS; {quantity(addition.replayed, unit)} replayed by MuJoCo"
-        moved = arrow(*addition.position_error, unit)
-        tiles.append(Tile(words("Position, free run"), moved, replayed))
-    also = also_chose_in_words(addition.told_on)
-    return Answer(
-        headline=f"Axis {step.axis}: {done(step)}",
-        sentence=proved_in_words(addition),
-        tiles=tiles,
-        remarks=[capitalised(also)] if also else [],
-        tone=Tone.STRONG if addition.kept else Tone.PLAIN,
-    )
-
-
-def done(step: HistoryStep) -> str:
-    """E.g. "cogging added"."""
-    how = "given the shape found" if step.action == "shape" else "added"
-    return f"{spaced(step.effect)} {how}"
 
 
 def notes(subject: Subject) -> list[Block]:
@@ -162,7 +129,8 @@ def notes(subject: Subject) -> list[Block]:
         for view in subject.views
         for note in (view.said.notes if view.said else ())
     ]
-    for step in (*subject.steps, *(a.step for a in subject.additions)):
-        said += [f"Axis {step.axis}, {done(step)}: {note}" for note in step.notes]
+    for step in subject.history:
+        how = "given the shape found" if step.action == "shape" else "added"
+        said += [f"Axis {step.axis}, {spaced(step.effect)} {how}: {note}" for note in step.notes]
     once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in said))
     return [Listing(once)] if once else []

@@ -182,13 +182,14 @@ def values_of(effect: Effect, model: AxisModel) -> str:
 def growth(subject: Subject) -> list[Block]:
     """A picture and a table for each axis with added effects; their position errors if known."""
     by_axis: dict[str, list[HistoryStep]] = {}
-    for step in subject.steps:
+    for step in subject.history:
         by_axis.setdefault(step.axis, []).append(step)
     blocks: list[Block] = []
+    floors = {view.name: view.floors for view in subject.views}
     for axis, steps in by_axis.items():
         if len(by_axis) > 1 or len(subject.views) > 1:
             blocks.append(Heading(f"Axis {axis}"))
-        blocks.append(growth_table(steps, subject.floors(axis)))
+        blocks.append(growth_table(steps, floors.get(axis, {})))
     if subject.additions:
         blocks.append(_positions(subject.additions))
     return blocks

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from identify.dataset.dataset import Role
-from identify.estimation.fit import Fit
 from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.results.addition import Addition
@@ -22,13 +21,16 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """The results that a report shows."""
+    """The results that a report shows. history: the effects that were added to the model.
+
+    source: what the page is made of. machine: what the model says of its loop.
+    """
 
     title: str
     diagnosis: Diagnosis | None
     comparison: Comparison
-    history: Sequence[HistoryStep]
-    additions: Sequence[Addition]
+    history: Sequence[HistoryStep] = ()
+    additions: Sequence[Addition] = ()
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
 
@@ -55,25 +57,27 @@ class Subject:
             leading = self.diagnosis.leading
             quiet = leading.verdict is Verdict.NOTHING_MISSING
             first = "" if quiet else leading.dataset.axis
-        return [AxisView(self, axis) for axis in sorted(axes, key=lambda a: a.axis != first)]
+        return [self._view(axis) for axis in sorted(axes, key=lambda a: a.axis != first)]
 
-    @property
-    def steps(self) -> Sequence[HistoryStep]:
-        """The added effects, from the model's history or else from the additions."""
-        return self.history or tuple(a.step for a in self.additions)
-
-    def floors(self, axis: str) -> Mapping[Role, float]:
-        """The noise floors of one axis by role of logs, N RMS; none where it does not move."""
-        view = next((v for v in self.views if v.name == axis), None)
-        return view.floors if view else {}
+    def _view(self, axis: AxisComparison) -> AxisView:
+        if self.diagnosis is None or axis.axis not in self.diagnosis.axes:
+            return AxisView(self, axis)
+        name, told = axis.axis, self.diagnosis
+        return AxisView(self, axis, told.axes[name], told.summaries[name], said_of(told, name))
 
 
 @dataclass(frozen=True, eq=False)
 class AxisView:
-    """One axis of a report. axis: the errors of the model of the comparison."""
+    """One axis of a report. axis: the errors of the model of the comparison.
+
+    found: its diagnosis; summary: what is told of its final model; said: the sentences about it.
+    """
 
     subject: Subject
     axis: AxisComparison
+    found: AxisDiagnosis | None = None
+    summary: AxisSummary | None = None
+    said: Said | None = None
 
     @property
     def name(self) -> str:
@@ -93,30 +97,6 @@ class AxisView:
         return self.subject.comparison.model.axes[self.name]
 
     @property
-    def found(self) -> AxisDiagnosis | None:
-        """The diagnosis of this axis, where there is one."""
-        return self.subject.diagnosis.axes.get(self.name) if self.subject.diagnosis else None
-
-    @property
-    def summary(self) -> AxisSummary | None:
-        """What is told of its final model, where it was diagnosed."""
-        return self.subject.diagnosis.summaries.get(self.name) if self.subject.diagnosis else None
-
-    @cached_property
-    def said(self) -> Said | None:
-        """The sentences about its diagnosis."""
-        return (
-            said_of(self.subject.diagnosis, self.name)
-            if self.subject.diagnosis and self.found
-            else None
-        )
-
-    @property
-    def final(self) -> Fit | None:
-        """The model with everything that was found; None where nothing was."""
-        return self.found.final if self.found and self.label else None
-
-    @property
     def label(self) -> str:
         """What was found on this axis; "" where nothing was."""
         return all_found(self.found) if self.found else ""
@@ -131,6 +111,6 @@ class AxisView:
         """What is drawn: of all logs of a diagnosis, else of those that were compared."""
         if self.found is None:
             return signals_of(dict.fromkeys(self.axis.logs), self.model, None)
-        dataset, final = self.found.dataset, self.final
-        logs = {log: role for role in Role for log in dataset.having(role)}
-        return signals_of(logs, self.found.base.axis, final.axis if final else None)
+        logs = {log: role for role in Role for log in self.found.dataset.having(role)}
+        final = self.found.final.axis if self.label else None
+        return signals_of(logs, self.found.base.axis, final)

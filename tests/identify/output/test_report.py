@@ -16,8 +16,8 @@ from report_cases import Case, Outline, cogging_case
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, quantity, typeset
-from identify.output.report import Source
 from identify.output.report.explorer import shown_of
+from identify.output.words.commands import Source
 from identify.output.words.diagnosis import verdict_in_words
 from identify.results.signals import Signals
 from identify.workflow import on_machine
@@ -72,7 +72,7 @@ def test_what_is_named_is_shown_with_what_it_gains_as_feedforward(case: Case, tm
     before, after = case.diagnosis.model, case.diagnosis.final_model
     known = on_machine(after, case.held, before)
     assert known.worth is not None
-    page = case.write(tmp_path / "w.html", on_machine=known)
+    page = case.write(tmp_path / "w.html", machine=known)
     found = known.worth.axes["x"]
     shown = page[page.index('<section id="worth"') :].partition("</section>")[0]
     assert f"cogging gains {typeset(quantity(found.gains['cogging'], 'm'))}" in shown

@@ -31,6 +31,7 @@ from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
 from identify.output.answers.answer import plain
 from identify.output.report import write_report
+from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis, FitResult
 from twin.checks import check_log
@@ -85,10 +86,8 @@ def gone_round(request, tmp_path_factory) -> Round:
 
 def page(r: Round, path: Path) -> str:
     """All that a reader of the report sees, in its plots too."""
-    write_report(
-        path, title="machine", diagnosis=r.found, comparison=r.found.comparison,
-        history=r.added.model.history, additions=[r.added],
-    )  # fmt: skip
+    history = r.added.model.history
+    write_report(path, Subject("machine", r.found, r.found.comparison, history, [r.added]))
     written = path.read_text()
     drawn = [json.loads(html.unescape(d)) for d in re.findall(r'data-chart="([^"]+)"', written)]
     signals = re.search(r'id="signals">(.*?)</script>', written, re.DOTALL)
