@@ -10,13 +10,15 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
+
+from identify.output.report.page import Block
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -64,10 +66,9 @@ STYLE: dict[RcKeyType, Any] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Picture(Block):
     """A figure on a page, with a sentence that says what to look for."""
 
-    macro: ClassVar[str] = "picture"
     figure: Figure
     caption: str
 

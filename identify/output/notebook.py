@@ -61,8 +61,8 @@ def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str |
     signals = view.signals
     name = coordinate or coordinate_of_answer(view, list(signals.coordinates))
     values = signals.over(name)
-    left = Scale.of(view.units.force, [3.0 * signals.size])
-    shown = named_signals(view, left)
+    shown = named_signals(view)
+    _, _, left = shown["before"]
     label, _, along = shown.get(name, ("Time", values, Scale.of("s", values)))
     figure, place = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
     plt.close(figure)  # a notebook shows what is returned, once

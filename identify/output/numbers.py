@@ -6,6 +6,7 @@ plain characters; ``typeset`` gives a page its minus signs, arrows and powers of
 
 from __future__ import annotations
 
+import base64
 import math
 import re
 from collections.abc import Sequence
@@ -157,6 +158,11 @@ def capitalised(sentence: str) -> str:
     named = first == "twin" or any(c.isdigit() or c == "_" for c in first)
     begin = sentence[:1] if named else sentence[:1].upper()
     return f"{begin}{sentence[1:]}{'' if sentence.endswith('.') else '.'}"
+
+
+def packed(values: ArrayLike, kind: str = "<i2") -> str:
+    """Numbers as a script of a page reads them: base64 of this type, integers of 16 bits."""
+    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
 
 
 def typeset(text: str) -> str:

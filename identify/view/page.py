@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import ArrayLike
 
+from identify.output.numbers import packed
 from identify.view.replay import AxisReplay, Replay
 from identify.view.stage import Stage
 from twin.files import write_atomically
@@ -59,7 +59,7 @@ def _axis(name: str, axis: AxisReplay) -> dict[str, Any]:
         "unit": axis.units.position,
         "force": axis.units.force,
         "bars": axis.units.words("Force of each effect"),
-        "measured": _base64(axis.measured, "<f4"),
+        "measured": packed(axis.measured, "<f4"),
         "setpoint": _packed(axis.setpoint - axis.measured),
         "modelled": _packed(axis.modelled - axis.measured),
         "forces": [{"name": n, "values": _packed(f)} for n, f in axis.forces.items()],
@@ -78,11 +78,7 @@ def _packed(signal: Array) -> dict[str, Any]:
     middle, size = 0.5 * (low + high), max((high - low) / (2 * STEPS), 1e-300)
     steps = np.full(len(signal), -STEPS - 1)
     steps[np.isfinite(signal)] = np.rint((known - middle) / size)
-    return {"middle": float(middle), "size": float(size), "steps": _base64(steps, "<i2")}
-
-
-def _base64(values: ArrayLike, kind: str) -> str:
-    return b64encode(np.asarray(values).astype(kind).tobytes()).decode()
+    return {"middle": float(middle), "size": float(size), "steps": packed(steps)}
 
 
 def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
@@ -183,8 +179,8 @@ def _mesh(model: mujoco.MjModel, mesh: int, most: int) -> dict[str, Any]:
         if (len(grid) * 6 + len(faces) * 12) * 4 / 3 <= most:
             break
     return {
-        "low": _short(low), "size": size, "grid": _base64(grid, "<u2"),
-        "faces": _base64(faces, "<u4"),
+        "low": _short(low), "size": size, "grid": packed(grid, "<u2"),
+        "faces": packed(faces, "<u4"),
     }  # fmt: skip
 
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.output.numbers import Scale, quantity, spaced, title_case, typeset
+from identify.output.numbers import Scale, packed, quantity, spaced, title_case, typeset
 from identify.output.report.subject import AxisView, Subject
 from identify.results.signals import Signals
 from twin.curve import Coordinate
 from twin.effect import Effect
 from twin.model.units import units_of
+from twin.signals import Array
 
-Array = NDArray[np.float64]
+Named = dict[str, tuple[str, Array, Scale]]
 
 MOST_VALUES = 950_000  # in a page, of 2 bytes, which are 2.7 characters: 2.5 of at most 3 MB
 LARGEST = 32767  # of 16 bits; the number below the least stands for no number
@@ -31,42 +31,28 @@ NAMES = {"velocity": "Speed", "distance_since_reversal": "Distance since reversa
 def explored(subject: Subject) -> list[dict[str, Any]]:
     """The signals of all axes, the leading one first."""
     views = [view for view in subject.views if np.isfinite(view.signals.before).any()]
-    most = MOST_VALUES // max(sum(len(named_signals(view)) for view in views), 1)
-    return [_axis(view, most) for view in views]
+    named = [named_signals(view) for view in views]
+    most = MOST_VALUES // max(sum(map(len, named)), 1)
+    return [_axis(view, own, most) for view, own in zip(views, named, strict=True)]
 
 
-def _axis(view: AxisView, most: int) -> dict[str, Any]:
+def _axis(view: AxisView, named: Named, most: int) -> dict[str, Any]:
     signals, words = view.signals, view.words
     index, every = shown_of(signals, most)
-    ends = np.cumsum([len(log) for log in signals.logs])
-    begins = ends - [len(log) for log in signals.logs]
-    kept = np.searchsorted(index, [*begins, ends[-1]])
-    residuals = ["before", *(["after"] if signals.after is not None else [])]
     coordinates = [n for n in signals.coordinates if n not in UNSUITED]
-    left = Scale.of(view.units.force, [3.0 * signals.size])
+    _, _, left = named["before"]
     return {
         "name": view.name,
         "every": every,
         "index": packed(np.diff(index, prepend=0)),
-        "logs": [
-            {
-                "title": f"{log.motion.name}{f' ({role.value})' if role else ''}",
-                "first": int(first),
-                "count": int(stop - start),
-                "start": float(log.time[0]),
-                "step": log.test_function.stride * log.test_function.period,
-            }
-            for log, role, first, start, stop in zip(
-                signals.logs, signals.roles, begins, kept, kept[1:], strict=False
-            )
-        ],
+        "logs": _logs(signals, index),
         "signals": [
             {"name": name, "label": text, "unit": scale.unit, "size": scale.size,
              **_coded(values[index])}
-            for name, (text, values, scale) in named_signals(view, left).items()
+            for name, (text, values, scale) in named.items()
         ],
         "coordinates": coordinates,
-        "residuals": residuals,
+        "residuals": [name for name in ("before", "after") if name in named],
         "effects": [f"effect {name}" for name in signals.effects],
         "against": coordinate_of_answer(view, coordinates),
         "floor": float(left(view.axis.floor)),
@@ -80,18 +66,33 @@ def _axis(view: AxisView, most: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def named_signals(view: AxisView, left: Scale | None = None) -> dict[str, tuple[str, Array, Scale]]:
+def _logs(signals: Signals, index: NDArray[np.int64]) -> list[dict[str, Any]]:
+    """Each log: its title, and which of the test functions in the page are its own."""
+    begins = np.cumsum([0, *(len(log) for log in signals.logs)])
+    kept = np.searchsorted(index, begins)
+    return [
+        {
+            "title": f"{log.motion.name}{f' ({role.value})' if role else ''}",
+            "first": int(first),
+            "count": int(count),
+            "start": float(log.time[0]),
+            "step": log.test_function.stride * log.test_function.period,
+        }
+        for log, role, first, count in zip(
+            signals.logs, signals.roles, begins[:-1], np.diff(kept), strict=True
+        )
+    ]
+
+
+def named_signals(view: AxisView) -> Named:
     """Every signal of a page by its name there: what it is called, its values, and the unit."""
     signals, units, words = view.signals, view.units, view.words
-    left = left or Scale.of(units.force, [])
+    left = Scale.of(units.force, [3.0 * signals.size])
     force = Scale.of(units.force, signals.to_explain)
     without = f"error without {view.label}" if view.label else words("unexplained force")
+    to_explain = words(TO_EXPLAIN.replace("mass", units.mass_name))
     named = {
-        "to_explain": (
-            words(TO_EXPLAIN.replace("mass", units.mass_name)),
-            signals.to_explain,
-            force,
-        ),
+        "to_explain": (to_explain, signals.to_explain, force),
         "before": (without, signals.before, left),
     }
     if signals.after is not None:
@@ -107,14 +108,13 @@ def named_signals(view: AxisView, left: Scale | None = None) -> dict[str, tuple[
 
 def coordinate_of_answer(view: AxisView, known: Sequence[str]) -> str:
     """The coordinate that the answer is about, else that of the worst region."""
-    found = view.found
-    named = [f.effect for f in found.findings] if found else []
-    effects = (
-        [f.effect for f in found.final.axis.effects if f.effect.name in named] if found else []
-    )
-    asked = [_of_effect(effect) for effect in sorted(effects, key=lambda e: named.index(e.name))]
-    asked += [found.unexplained.depends_on] if found and found.unexplained else []
-    others = any(effect.reads_other_axis for effect in effects)
+    asked, others = [], False
+    if found := view.found:
+        model = {f.effect.name: f.effect for f in found.final.axis.effects}
+        effects = [model[f.effect] for f in found.findings if f.effect in model]
+        asked = [_of_effect(effect) for effect in effects]
+        asked += [found.unexplained.depends_on] if found.unexplained else []
+        others = any(effect.reads_other_axis for effect in effects)
     asked += [r.coordinate for r in view.axis.worst if others or not r.coordinate.startswith(OTHER)]
     return next((name for name in asked if name in known or name == "time"), known[0])
 
@@ -148,23 +148,17 @@ def shown_of(signals: Signals, most: int) -> tuple[NDArray[np.int64], int]:
     return np.unique(np.concatenate(picked)), every
 
 
-def packed(values: NDArray[Any]) -> str:
-    """Integers of 16 bits as text."""
-    return base64.b64encode(np.asarray(values, dtype="<i2").tobytes()).decode("ascii")
-
-
 def _coded(values: Array) -> dict[str, Any]:
     """A signal in 16 bits: middle + scale * sinh(number * step), so that small values stay exact.
 
     Beside a spike a hundred thousand times the noise, the noise has still three digits.
     """
     finite = np.isfinite(values)
-    middle = float(np.median(values[finite])) if finite.any() else 0.0
-    beside = np.where(finite, values - middle, 0.0)
-    largest = float(np.abs(beside).max(initial=0.0)) or 1.0
-    scale = max(
-        float(np.median(np.abs(beside[finite]))) if finite.any() else 0.0, SMALLEST * largest
-    )
+    known = values[finite] if finite.any() else np.zeros(1)
+    middle = float(np.median(known))
+    beside, sizes = np.where(finite, values - middle, 0.0), np.abs(known - middle)
+    largest = float(sizes.max()) or 1.0
+    scale = max(float(np.median(sizes)), SMALLEST * largest)
     step = float(np.arcsinh(largest / scale)) / LARGEST
     coded = np.where(finite, np.rint(np.arcsinh(beside / scale) / step), NO_NUMBER)
     return {"middle": middle, "scale": scale, "step": step, "data": packed(coded)}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from numpy.typing import NDArray
 
 from identify.frequency.of_logs import AxisFrequency, Shown
+from identify.frequency.response import Response
 from identify.output.frequency import read_off
 from identify.output.numbers import NOTHING, pretty, quantity
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
@@ -22,65 +24,58 @@ def responses(view: AxisView) -> list[Block]:
     return [_magnitude(found), _phase(found), _table(found)]
 
 
-def _of(found: AxisFrequency) -> list[tuple[str, Shown, Ink]]:
-    """What is shown: the model's response is of the same frequencies as the measured one."""
+def _shown(found: AxisFrequency) -> list[tuple[str, Shown, Ink]]:
+    """What is drawn: the model's response is of the same frequencies as the measured one."""
     model = [("model", found.modelled, Ink.AFTER)] if found.modelled else []
     return [("measured", found.measured, Ink.INK), *model]
 
 
 def _magnitude(found: AxisFrequency) -> Chart:
-    lines = []
-    for name, shown, ink in _of(found):
-        response = shown.response
-        size = np.abs(response.plant)
-        edges = (np.maximum(size - response.band, 1e-3 * size), size + response.band)
-        lines += [
-            Drawn(f"{name}, 90 % band", _where_told(found, shown, _decibels(edge)), Line.BAND, ink)
-            for edge in edges
-        ]
-        lines.append(Drawn(name, _where_told(found, shown, _decibels(size)), Line.LINE, ink))
+    def lines(name: str, response: Response) -> list[tuple[str, Array, Line]]:
+        size, band = np.abs(response.plant), f"{name}, 90 % band"
+        low, high = np.maximum(size - response.band, 1e-3 * size), size + response.band
+        curves = ((band, low, Line.BAND), (band, high, Line.BAND), (name, size, Line.LINE))
+        return [(label, 20.0 * np.log10(curve), line) for label, curve, line in curves]
+
     caption = (
         "Force to position, as the best linear approximation with the setpoint as instrument. The "
         "model is simulated on the same setpoint, so that friction lowers both alike."
     )
-    unit = pretty(found.units("m/N"))
-    return Chart(_frequencies(found), f"Magnitude (dB of {unit})", lines, caption, log_x=True)
+    return _chart(found, f"Magnitude (dB of {pretty(found.units('m/N'))})", lines, caption)
 
 
 def _phase(found: AxisFrequency) -> Chart:
-    lines = []
-    for name, shown, ink in _of(found):
-        turned = np.degrees(np.angle(shown.response.plant)) % -360.0
-        lines.append(Drawn(name, _where_told(found, shown, turned), Line.LINE, ink))
-    return Chart(_frequencies(found), "Phase (degrees)", lines, log_x=True)
+    def lines(name: str, response: Response) -> list[tuple[str, Array, Line]]:
+        return [(name, np.degrees(np.angle(response.plant)) % -360.0, Line.LINE)]
+
+    return _chart(found, "Phase (degrees)", lines)
 
 
-def _decibels(size: Array) -> Array:
-    return 20.0 * np.log10(size)
-
-
-def _frequencies(found: AxisFrequency) -> tuple[str, Array]:
-    return "Frequency (Hz)", found.measured.response.frequency[_told(found)]
-
-
-def _told(found: AxisFrequency) -> NDArray[np.bool_]:
-    """At which frequencies one of those shown tells something."""
-    return np.any([shown.response.tells for _, shown, _ in _of(found)], axis=0)
-
-
-def _where_told(found: AxisFrequency, shown: Shown, values: Array) -> Array:
-    return np.where(shown.response.tells, values, np.nan)[_told(found)]
+def _chart(
+    found: AxisFrequency,
+    title: str,
+    lines: Callable[[str, Response], list[tuple[str, Array, Line]]],
+    caption: str = "",
+) -> Chart:
+    """Lines of each response, at the frequencies at which one of them tells something."""
+    shown = _shown(found)
+    told = np.any([one.response.tells for _, one, _ in shown], axis=0)
+    drawn = [
+        Drawn(label, np.where(one.response.tells, values, np.nan)[told], line, ink)
+        for name, one, ink in shown
+        for label, values, line in lines(name, one.response)
+    ]
+    frequencies = ("Frequency (Hz)", found.measured.response.frequency[told])
+    return Chart(frequencies, title, drawn, caption, log_x=True)
 
 
 def _table(found: AxisFrequency) -> Table:
     """What is read off each, side by side."""
-    told = {name: dict(read_off(shown, found.units)) for name, shown, _ in _of(found)}
+    told = {name: dict(read_off(shown, found.units)) for name, shown, _ in _shown(found)}
     rows = dict.fromkeys(name for facts in told.values() for name in facts)
     titles = ("Read off, with 90 % band", *(name.capitalize() for name in told))
-    return Table(
-        titles,
-        [Row((row, *(facts.get(row, NOTHING) for facts in told.values()))) for row in rows],
-    )
+    cells = [(row, *(facts.get(row, NOTHING) for facts in told.values())) for row in rows]
+    return Table(titles, [Row(one) for one in cells])
 
 
 def worth(view: AxisView) -> list[Block]:
@@ -103,5 +98,4 @@ def worth(view: AxisView) -> list[Block]:
     )
     told = [f"{effect} gains {quantity(gain, unit)}." for effect, gain in found.gains.items()]
     told += [f"Not in it: {effect}, {why}." for effect, why in result.lost[view.name].items()]
-    table = Table(("Tracking error", "RMS", "Largest"), rows, caption)
-    return [table, *([Listing(told)] if told else [])]
+    return [Table(("Tracking error", "RMS", "Largest"), rows, caption), Listing(told)]

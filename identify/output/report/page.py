@@ -7,21 +7,19 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from numpy.typing import NDArray
 
 from identify.output.numbers import NOTHING, typeset
+from twin.signals import Array
 
 if TYPE_CHECKING:
     from identify.output.report.subject import AxisView, Subject
 
-Array = NDArray[np.float64]
 NUMBER = re.compile(rf"(-?([\d.]+(e[+-]\d+)?|∞)( \S+)?|{NOTHING})?")  # a cell, with its unit
 CHART_DIGITS = 5  # significant, of a number that is drawn
-
 
 TEMPLATES = Environment(
     loader=PackageLoader("identify.output.report", "."), autoescape=True,
@@ -38,17 +36,18 @@ class Tone(Enum):
     MUTED = "muted"
 
 
-class Block(Protocol):
-    """A piece of a section, drawn by the macro of its name in blocks.html.j2."""
+class Block:
+    """A piece of a section, drawn by the macro of blocks.html.j2 that has the name of its class."""
 
-    macro: ClassVar[str]
+    @property
+    def macro(self) -> str:
+        return type(self).__name__.lower()
 
 
 @dataclass(frozen=True)
-class Heading:
+class Heading(Block):
     """A heading inside a section."""
 
-    macro: ClassVar[str] = "heading"
     text: str
 
 
@@ -82,10 +81,9 @@ class Drawn:
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class Chart(Block):
     """Lines over common horizontal values in printed units, drawn in the reader's browser."""
 
-    macro: ClassVar[str] = "chart"
     x: tuple[str, Array]
     y: str
     lines: Sequence[Drawn]
@@ -124,10 +122,9 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Block):
     """A table, with a sentence below it (may be empty); titles: of the columns."""
 
-    macro: ClassVar[str] = "table"
     titles: Sequence[str]
     rows: Sequence[Row]
     caption: str = ""
@@ -140,18 +137,16 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Listing:
+class Listing(Block):
     """Sentences, one an item."""
 
-    macro: ClassVar[str] = "listing"
     items: Sequence[str]
 
 
 @dataclass(frozen=True)
-class Facts:
+class Facts(Block):
     """Named facts; the first is set as a formula."""
 
-    macro: ClassVar[str] = "facts"
     formula: str
     pairs: Sequence[tuple[str, str]]
 
@@ -166,10 +161,9 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Answer(Block):
     """The answer for one axis, in big words. commands: what to run next."""
 
-    macro: ClassVar[str] = "answer"
     headline: str
     sentence: str
     tiles: Sequence[Tile]
