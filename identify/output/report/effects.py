@@ -41,11 +41,13 @@ from identify.output.words.fit import (
     nonparametric_in_words,
 )
 from identify.results.addition import Addition
+from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
 from twin.model.machine import AxisModel, HistoryStep
+from twin.model.parameters import all_parameters, read
 from twin.model.units import units_of
 
 UNBROKEN = "\u00a0"  # space at which no line ends
@@ -92,14 +94,14 @@ def found(view: AxisView) -> list[Block]:
 def law_shapes(view: AxisView) -> list[Block]:
     """A picture for each law that is found to have another shape."""
     blocks: list[Block] = []
-    for finding in view.found.findings if view.found else ():
-        if finding.shape is not None:
+    for f in view.found.findings if view.found else ():
+        if f.shape is not None:
             caption = (
-                f"{shape_in_words(finding.effect, finding.shape)} Where the band holds the dashed "
-                "line, these logs do not tell the two apart."
+                f"{shape_in_words(f.effect, f.shape)} Where the band holds the dashed line, these "
+                "logs do not tell the two apart."
             )
-            blocks.append(Heading(f"{spaced(finding.effect)} on {view.name}".capitalize()))
-            blocks += [*shape_charts(finding.shape), Listing([caption])]
+            blocks.append(Heading(f"{spaced(f.effect)} on {view.name}".capitalize()))
+            blocks += [*shape_charts(f.shape), Listing([caption])]
     return blocks
 
 
@@ -132,19 +134,22 @@ WITH_VALUES = 3  # candidates whose parameter values are printed
 
 def ranking(view: AxisView) -> list[Block]:
     """A table of all absent effects that were refitted, best first, and the others' names."""
-    every = view.found.ranking if view.found else ()
-    others = ", ".join(spaced(c.effect.name) for c in every if not c.score)
-    said = f"Not refitted, as one linear step of them takes too little: {others}."
-    table = [_ranked(view.found)] if view.found and any(c.score for c in every) else []
-    return [*table, *([Listing([said])] if others else [])]
+    if view.found is None:
+        return []
+    refitted = [c for c in view.found.ranking if c.score]
+    blocks: list[Block] = [_ranked(view.found, refitted)] if refitted else []
+    if others := ", ".join(spaced(c.effect.name) for c in view.found.ranking if not c.score):
+        said = f"Not refitted, as one linear step of them takes too little: {others}."
+        blocks.append(Listing([said]))
+    return blocks
 
 
-def _ranked(found: AxisDiagnosis) -> Table:
+def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
     scale = Scale.of(units.force, [e for c in found.ranking for e in (c.gain.before, c.gain.after)])
     rows = []
-    for rank, c in enumerate(c for c in found.ranking if c.score):
+    for rank, c in enumerate(refitted):
         tone = Tone.PLAIN if c.supported else Tone.MUTED
         part = max(c.part, 0.0)
         cells = (
@@ -171,8 +176,8 @@ def _ranked(found: AxisDiagnosis) -> Table:
 
 def values_of(effect: Effect, model: AxisModel) -> str:
     """The values of an effect's parameters in a model, with units."""
-    values, units = model[effect.name].values, model.units
-    texts = (f"{p.name} = {quantity(values[p.name], units(p.unit))}" for p in effect.parameters)
+    units = model.parameter_units(effect.name)
+    texts = (f"{n} = {quantity(v, units[n])}" for n, v in model[effect.name].values.items())
     return ", ".join(t.replace(" ", UNBROKEN) for t in texts)
 
 
@@ -238,10 +243,20 @@ def _positions(additions: Sequence[Addition]) -> Table:
 
 def equations(view: AxisView) -> list[Block]:
     """The named effects, those that the data cannot separate from them, and fitted curves."""
+    blocks: list[Block] = []
+    for effect, model in _named(view):
+        pairs = (
+            ("What it is", effect.summary),
+            ("Fingerprint", effect.fingerprint),
+            ("Excited by", effect.excited_by),
+            ("Fitted", values_of(effect, model)),
+            ("Source", effect.source),
+        )
+        heading = Heading(f"{title_case(effect.name)} on {view.name}")
+        blocks += [heading, Facts(effect.equation, pairs)]
     curves = [f for f in view.model.effects if f.effect.is_nonparametric]
-    said = [Listing([capitalised(nonparametric_in_words(f)) for f in curves])] if curves else []
-    laws = [b for effect, model in _named(view) for b in _law(effect, model, view.name)]
-    return [*laws, *said]
+    said = [capitalised(nonparametric_in_words(f)) for f in curves]
+    return [*blocks, Listing(said)] if said else blocks
 
 
 def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
@@ -253,17 +268,6 @@ def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
         if name in final.names:
             yield final[name].effect, final
         yield from ((tried[n].effect, tried[n].fit.axis) for n in tied if n in tried)
-
-
-def _law(effect: Effect, model: AxisModel, axis: str) -> list[Block]:
-    pairs = (
-        ("What it is", effect.summary),
-        ("Fingerprint", effect.fingerprint),
-        ("Excited by", effect.excited_by),
-        ("Fitted", values_of(effect, model)),
-        ("Source", effect.source),
-    )
-    return [Heading(f"{title_case(effect.name)} on {axis}"), Facts(effect.equation, pairs)]
 
 
 # --- parameters ------------------------------------------------------------------------------
@@ -282,14 +286,12 @@ def parameters(view: AxisView) -> list[Block]:
 
 def given_table(axis: AxisModel) -> Table:
     """Values of a model that was not fitted here."""
-    meanings, units, mass = _meanings(axis), axis.units, axis.mass_parameter
-    values = {mass.name: quantity(axis.mass, units(mass.unit))} | {
-        f"{f.effect.name}.{p.name}": quantity(f.values[p.name], units(p.unit))
-        for f in axis.effects
-        for p in f.effect.parameters
-    }
-    hidden = nonparametric_labels(axis)
-    rows = [Row((k, value, meanings[k])) for k, value in values.items() if k not in hidden]
+    every, hidden = all_parameters(axis), nonparametric_labels(axis)
+    rows = [
+        Row((c.label, quantity(float(value), axis.units(c.parameter.unit)), c.parameter.meaning))
+        for c, value in zip(every, read(axis, every), strict=True)
+        if c.label not in hidden
+    ]
     caption = "Values of the given model; twin fit adds intervals."
     return Table(("Parameter", "Value", "Meaning"), rows, caption)
 
@@ -304,7 +306,8 @@ def fit_table(
 
     floor: the one noise floor that is told, N.
     """
-    meanings, hidden = _meanings(axis), nonparametric_labels(axis)
+    hidden = nonparametric_labels(axis)
+    meanings = {c.label: c.parameter.meaning for c in all_parameters(axis)}
     labels = dict.fromkeys(e.label for known in reversed([*sides.values()]) for e in known)
     titles, remarks, cells = ["Parameter"], [], {n: [n] for n in labels if n not in hidden}
     for heading, known in sides.items():
@@ -322,10 +325,3 @@ def fit_table(
         for name, row in cells.items()
     ]
     return Table([*titles, "Meaning"], rows, " ".join(remarks))
-
-
-def _meanings(axis: AxisModel) -> dict[str, str]:
-    own = {
-        f"{f.effect.name}.{p.name}": p.meaning for f in axis.effects for p in f.effect.parameters
-    }
-    return {axis.mass_parameter.name: axis.mass_parameter.meaning, **own}
