@@ -26,14 +26,12 @@ def frequency_text(result: FrequencyResponse) -> str:
     lines = [f"force to position, from {listed(result.logs)}"]
     for name, axis in result.axes.items():
         lines.append(f"axis {name}")
-        lines += _shown("measured", axis.measured, axis.units)
-        if axis.modelled:
-            lines += _shown("model, in simulation on the same setpoint", axis.modelled, axis.units)
+        model = "model, in simulation on the same setpoint"
+        for title, shown in (("measured", axis.measured), (model, axis.modelled)):
+            if shown is not None:
+                lines.append(f"  {title}")
+                lines += [f"    {what}: {value}" for what, value in read_off(shown, axis.units)]
     return "\n".join(lines)
-
-
-def _shown(title: str, shown: Shown, units: AxisUnits) -> list[str]:
-    return [f"  {title}", *(f"    {name}: {value}" for name, value in read_off(shown, units))]
 
 
 def read_off(shown: Shown, units: AxisUnits) -> list[tuple[str, str]]:
@@ -95,11 +93,7 @@ def _with_band(one: Banded, unit: str) -> str:
 
 
 @figure_of.register(FrequencyResponse)
-def _figure(result: FrequencyResponse, coordinate: str | None, axis: str | None) -> Figure:
-    return bode(result)
-
-
-def bode(result: FrequencyResponse) -> Figure:
+def bode(result: FrequencyResponse, *_: None) -> Figure:
     """Magnitude with its 90 % band, phase, and coherence of each axis; a column an axis."""
     import matplotlib.pyplot as plt
 
@@ -122,20 +116,20 @@ def _draw(places: list[Axes], axis: AxisFrequency) -> None:
     for (name, shown), ink in zip(pairs, INKS, strict=True):
         if shown is None:
             continue
-        found = shown.response.at(shown.response.tells)
+        kept = shown.response.tells
+        found = shown.response.at(kept)
         size = np.abs(found.plant)
         low = np.maximum(size - found.band, 1e-3 * size)
         level.fill_between(found.frequency, low, size + found.band, color=ink, alpha=0.2, lw=0)
-        level.loglog(found.frequency, size, ".", ms=4, color=ink, label=f"{name}, 90 % band")
-        turn.semilogx(found.frequency, np.degrees(np.angle(found.plant)) % -360.0, ".", ms=4,
-                      color=ink)  # fmt: skip
+        curves = [(found.plant, "90 % band", {"marker": ".", "ms": 4, "ls": ""})]
         if shown.plant is not None:
-            kept = shown.response.tells
-            fitted = shown.plant.fitted[kept]
+            curves.append((shown.plant.fitted[kept], "read off", {"lw": 1}))
+        for plant, what, style in curves:
+            phase = np.degrees(np.angle(plant)) % -360.0
             level.loglog(
-                found.frequency, np.abs(fitted), lw=1, color=ink, label=f"{name}, read off"
+                found.frequency, np.abs(plant), color=ink, label=f"{name}, {what}", **style
             )
-            turn.semilogx(found.frequency, np.degrees(np.angle(fitted)) % -360.0, lw=1, color=ink)
+            turn.semilogx(found.frequency, phase, color=ink, **style)
         share.semilogx(shown.response.frequency, shown.response.coherence, lw=1, color=ink)
     level.set_ylabel(f"Magnitude ({unit})")
     turn.set_ylabel("Phase (degrees)")

@@ -41,7 +41,7 @@ from identify.output.words.plan import (
     question_in_words,
     supposed_in_words,
 )
-from identify.output.words.residual import correlation_in_words, loop_in_words, region_in_words
+from identify.output.words.residual import LOOPS, correlation_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
 from identify.results.addition import Addition, CorrectedBody
 from identify.results.results import (
@@ -51,6 +51,7 @@ from identify.results.results import (
     Feedforward,
     FitResult,
     SimulationFit,
+    refitted,
 )
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
@@ -58,7 +59,6 @@ from identify.selection.nonparametric import nonparametric_labels
 from identify.validation.agreement import Agreement
 from identify.validation.comparison import AxisComparison
 from twin.experiments.file import in_short
-from twin.model.parameters import free_parameters, read
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,10 +123,7 @@ def simulation_fit_text(result: SimulationFit) -> str:
     for axis, fit in result.axes.items():
         said = motion_fit_in_words(axis, fit, result.holdout_error[axis])
         lines += [said[0], *(f"  {line}" for line in said[1:])]
-        where = free_parameters(fit.axis)
-        for c, now, before in zip(
-            where, read(fit.axis, where), read(fit.begun, where), strict=True
-        ):
+        for c, before, now in refitted(fit):
             scale = Scale.of(fit.axis.units(c.parameter.unit), [now])
             value = f"{number(now / scale.size, 6)} {scale.unit}".rstrip()
             lines.append(f"  {c.label:34s} {value} (force fit {number(before / scale.size, 6)})")
@@ -148,7 +145,7 @@ def compare_text(result: Comparison) -> str:
         if not c.worst:
             lines.append("  in no region is the error above the noise")
         lines += [f"  {words(correlation_in_words(test))}" for test in c.tests.correlations]
-    lines += dict.fromkeys(c.units.words(loop_in_words(c.tests.loop)) for c in result.axes.values())
+    lines += dict.fromkeys(c.units.words(LOOPS[c.tests.loop]) for c in result.axes.values())
     return "\n".join(lines)
 
 

@@ -57,9 +57,11 @@ class FitResult(Printed):
 DISAGREE = 2.0  # times, by which the values of two objectives differ where one of them is wrong
 
 
-def _pairs(fit: MotionFit) -> Iterator[tuple[ParameterReference, float, float]]:
+def refitted(fit: MotionFit) -> Iterator[tuple[ParameterReference, float, float]]:
+    """Each parameter with its value by the fit of the force, and by this one."""
     where = free_parameters(fit.axis)
-    return zip(where, read(fit.begun, where), read(fit.axis, where), strict=True)
+    values = (read(axis, where).tolist() for axis in (fit.begun, fit.axis))
+    return zip(where, *values, strict=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,9 +84,9 @@ class SimulationFit(Printed):
         Of parameters that cannot be negative: of others, such as a phase, a ratio says nothing.
         """
         return tuple(
-            (axis, c.label, float(before), float(after))
+            (axis, c.label, before, after)
             for axis, fit in self.axes.items()
-            for c, before, after in _pairs(fit)
+            for c, before, after in refitted(fit)
             if c.parameter.lower >= 0.0 and not before <= DISAGREE * after <= DISAGREE**2 * before
         )
 

@@ -15,12 +15,10 @@ from identify.output.words.fit import (
     no_interval_in_words,
     objectives_in_words,
 )
-from identify.output.words.residual import loop_in_words, region_in_words
-from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit
+from identify.output.words.residual import LOOPS, region_in_words
+from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
 from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
-from twin.model.parameters import free_parameters
-from twin.model.parameters import read as values_of
 
 # --- fits ------------------------------------------------------------------------------------
 
@@ -178,8 +176,7 @@ def _(result: SimulationFit, **more: Any) -> SimulationFitAnswer:
 
 
 def _motion_fit(fit: MotionFit, held: tuple[float, float] | None) -> SimulationFitEntry:
-    units, where = fit.axis.units, free_parameters(fit.axis)
-    values = zip(where, values_of(fit.axis, where), values_of(fit.begun, where), strict=True)
+    units = fit.axis.units
     before, after = held or (None, None)
     return SimulationFitEntry.of(
         fit,
@@ -189,7 +186,7 @@ def _motion_fit(fit: MotionFit, held: tuple[float, float] | None) -> SimulationF
         holdout_position_error_of_force_fit=before,
         parameters={
             c.label: {"value": now, "force_fit": begun, "unit": units(c.parameter.unit)}
-            for c, now, begun in values
+            for c, begun, now in refitted(fit)
         },
         beginnings={
             log.motion.name: BeginningEntry.of(
@@ -406,7 +403,7 @@ def _comparison(c: AxisComparison) -> ComparisonEntry:
             t,
             tested=units.words("force residual"),
             loop=t.loop.name.lower(),
-            reason=units.words(loop_in_words(t.loop)),
+            reason=units.words(LOOPS[t.loop]),
             histogram=HistogramEntry.of(t, unit=units.force, density_unit=units("1/N")),
             correlations={one.signal: one for one in t.correlations},
         ),

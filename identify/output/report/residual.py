@@ -10,7 +10,7 @@ from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import Scale, capitalised, inverse, number, percent, quantity, spaced
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.residual import correlation_in_words, loop_in_words, place_in_words
+from identify.output.words.residual import LOOPS, correlation_in_words, place_in_words
 from identify.rules import RULE
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON
@@ -97,7 +97,7 @@ def whiteness(view: AxisView) -> list[Block]:
 
 def reasons(subject: Subject) -> list[Block]:
     """How the axes were tested and why, each way once."""
-    said = (view.words(loop_in_words(view.axis.tests.loop)) for view in subject.views)
+    said = (view.words(LOOPS[view.axis.tests.loop]) for view in subject.views)
     return [Listing(tuple(dict.fromkeys(said)))]
 
 

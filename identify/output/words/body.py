@@ -20,34 +20,29 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
     if found.element is None:
         return [*said, f"Next: change the body in {file}, then fit again."]
     command = f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
-    dataset = result.axes[next(iter(result.axes))].dataset
-    said.append(
-        f"Next: {source.filled(command, names_of(dataset))} writes {inertial(*found.element)} into "
-        f"the body, in a copy of {file}."
-    )
-    return said
+    filled = source.filled(command, names_of(next(iter(result.axes.values())).dataset))
+    written = inertial(*found.element)
+    return [*said, f"Next: {filled} writes {written} into the body, in a copy of {file}."]
 
 
 def corrected_in_words(result: CorrectedBody) -> list[str]:
     """What was written, why, and what it did to the errors."""
-    found, written = result.body, result.model.mjcf_name
-    return [
-        f"Body {found.body} of {written} has {result.element}; {result.given.mjcf_name} is as it "
-        "was.",
-        *wrong_body_in_words(found, result.given),
-    ]
+    found, written, given = result.body, result.model.mjcf_name, result.given.mjcf_name
+    said = f"Body {found.body} of {written} has {result.element}; {given} is as it was."
+    return [said, *wrong_body_in_words(found, result.given)]
 
 
 def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     """That a body is not as its file has it, by how much, and the errors without and with it."""
     file, name = model.mjcf_name, " or ".join((found.body, *found.level))
     score = found.score
+    more = (f"{part} {with_band(*told, INERTIAL[part])}" for part, told in found.told.items())
     said = [
         f"The inertia of body {name} is not as {file} has it (confidence "
         f"{percent(found.confidence)}): it removes {percent(score.part)} of what all joints leave "
         "above their noise floors; the same torques shifted in time, which cannot be real, at most "
         f"{percent(score.control)} (19 of 20 times).",
-        f"More than in the file, about its own frame: {_parameters(found)}.",
+        f"More than in the file, about its own frame: {', '.join(more)}.",
     ]
     if found.untold:
         said.append(f"These joints do not tell its {listed(found.untold)}.")
@@ -59,10 +54,3 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     on = found.errors[found.axes[0]].on.value
     said.append(f"Error on the {on} logs without and with it: {', '.join(errors)}.")
     return said
-
-
-def _parameters(found: WrongBody) -> str:
-    return ", ".join(
-        f"{name} {with_band(value, band, INERTIAL[name])}"
-        for name, (value, band) in found.told.items()
-    )

@@ -68,12 +68,14 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     beside = all_in_words(found)
     if found.small:
         beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
-    corrected = result.body is not None and axis in result.body.axes
-    body = f"with body {result.body.body} as it was found, " if result.body and corrected else ""
+    corrected, verdict = "", words(verdict_in_words(found))
+    if result.body and axis in result.body.axes:
+        corrected = f"with body {result.body.body} as it was found, "
+        verdict = capitalised(f"{corrected}{verdict[0].lower()}{verdict[1:]}")
     advised = found.unexplained or any(f.shape for f in found.findings)
     return Said(
-        headline=f"{body}{headline_in_words(found)}",
-        verdict=_beside(body, words(verdict_in_words(found))),
+        headline=f"{corrected}{headline_in_words(found)}",
+        verdict=verdict,
         findings=tuple(finding_in_words(f) for f in found.findings),
         beside=tuple(beside),
         shapes=tuple(shape_in_words(f.effect, f.shape) for f in found.findings if f.shape),
@@ -83,10 +85,6 @@ def said_of(result: Diagnosis, axis: str) -> Said:
         steps=tuple(step_lines(found)),
         notes=remarks_on(result, axis),
     )
-
-
-def _beside(body: str, verdict: str) -> str:
-    return capitalised(f"{body}{verdict[0].lower()}{verdict[1:]}") if body else verdict
 
 
 # --- the answer -------------------------------------------------------------------------------
@@ -112,12 +110,10 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
 
 def _proved(found: AxisDiagnosis) -> str:
     lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
+    proof = f"the training logs prove {them}, block by block; there is no selection log"
     if found.dataset.holdout:
-        return f"The model lacks {lacks}: the training logs and the selection logs prove {them}."
-    return (
-        f"The model lacks {lacks}: the training logs prove {them}, block by block; there is no "
-        "selection log."
-    )
+        proof = f"the training logs and the selection logs prove {them}"
+    return f"The model lacks {lacks}: {proof}."
 
 
 def _ties(found: AxisDiagnosis) -> str:
@@ -132,14 +128,16 @@ def _ties(found: AxisDiagnosis) -> str:
 
 def headline_in_words(found: AxisDiagnosis) -> str:
     """E.g. "cogging or quadratic drag, and lugre are missing"."""
-    answer = {
-        Verdict.MISSING_EFFECTS: f"{named_in_words(found)} {'are' * (len(found.named) > 1) or 'is'}"
-        " missing",
-        Verdict.WRONG_SHAPE: f"{found.findings[0].effect if found.findings else ''} has another "
-        "shape",
-        Verdict.UNEXPLAINED: "something outside the catalogue is missing",
-        Verdict.NOTHING_MISSING: "nothing is missing",
-    }[found.verdict]
+    match found.verdict:
+        case Verdict.MISSING_EFFECTS:
+            are = "are" if len(found.named) > 1 else "is"
+            answer = f"{named_in_words(found)} {are} missing"
+        case Verdict.WRONG_SHAPE:
+            answer = f"{found.findings[0].effect} has another shape"
+        case Verdict.UNEXPLAINED:
+            answer = "something outside the catalogue is missing"
+        case Verdict.NOTHING_MISSING:
+            answer = "nothing is missing"
     against = not_confirmed_in_words(found)
     return spaced(f"{answer} ({against})" if against else answer)
 
@@ -157,9 +155,8 @@ def named_in_words(found: AxisDiagnosis) -> str:
         " or ".join((f"something like {name}" if name in alike else name, *tied))
         for name, *tied in found.answers
     ]
-    if any(tied for _, *tied in found.answers):
-        return ", and ".join(each)
-    return listed(each) if each else ""
+    ambiguous = any(tied for _, *tied in found.answers)
+    return ", and ".join(each) if ambiguous or not each else listed(each)
 
 
 def all_found(found: AxisDiagnosis) -> str:
@@ -202,9 +199,9 @@ def step_lines(found: AxisDiagnosis) -> list[str]:
 
     Nothing of a single one that is named: its line among the candidates says it.
     """
-    lines: list[str] = []
     if len(found.steps) == 1 and found.steps[0].tried.candidate is found.best:
-        return lines
+        return []
+    lines = []
     for i, step in enumerate(found.steps):
         candidate, what = step.tried.candidate, model_change_in_words(step.change)
         if candidate.is_noise:

@@ -38,8 +38,7 @@ OUTCOMES = {
     ),
 }
 MOTION_OUTCOMES = {
-    Outcome.CONVERGED: "The fit converged: no parameter change lowers the position error further.",
-    Outcome.NOT_CONVERGED: OUTCOMES[Outcome.NOT_CONVERGED],
+    ended: said.replace("force error", "position error") for ended, said in OUTCOMES.items()
 }
 HELD_OUT_GREW = (
     "The error on logs that were not fitted grew, so the force fit is the better one: noise of the "
@@ -94,8 +93,8 @@ def objectives_in_words(result: SimulationFit) -> list[str]:
 
 def common_reason(found: Sequence[Estimate]) -> NoInterval | None:
     """Why a fit has no intervals at all; None where it has."""
-    reasons = (e.reason for e in found)
-    return next((r for r in reasons if isinstance(r, AlwaysAtRest | ModelWrong)), None)
+    common = (e.reason for e in found if isinstance(e.reason, AlwaysAtRest | ModelWrong))
+    return next(common, None)
 
 
 def no_interval_in_words(reason: NoInterval) -> str:
@@ -201,14 +200,13 @@ def aliasing_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
 def change_in_words(change: Change) -> str:
     """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
     force = units_of(change.force_unit).words("force")
-    same = ""
-    if change.alike:
-        verb = "give" if len(change.alike) > 1 else "gives"
-        same = f" ({' and '.join(change.alike)} {verb} the same {force})"
-    return (
-        f"{change.label} {arrow(change.before, change.after, change.unit)} changes the {force} by "
-        f"{quantity(change.force, change.force_unit)}{same}"
-    )
+    values = arrow(change.before, change.after, change.unit)
+    size = quantity(change.force, change.force_unit)
+    said = f"{change.label} {values} changes the {force} by {size}"
+    if not change.alike:
+        return said
+    verb = "give" if len(change.alike) > 1 else "gives"
+    return f"{said} ({' and '.join(change.alike)} {verb} the same {force})"
 
 
 def refit_in_words(refit: Refit) -> str | None:
@@ -216,10 +214,9 @@ def refit_in_words(refit: Refit) -> str | None:
     if not refit.changes:
         return None
     error = units_of(refit.unit).words("force error")
-    return (
-        f"with the given values the {error} is {quantity(refit.given, refit.unit)}, after the fit "
-        f"{quantity(refit.refitted, refit.unit)}: {', '.join(map(change_in_words, refit.changes))}"
-    )
+    before, after = (quantity(e, refit.unit) for e in (refit.given, refit.refitted))
+    changes = ", ".join(map(change_in_words, refit.changes))
+    return f"with the given values the {error} is {before}, after the fit {after}: {changes}"
 
 
 def moved_in_words(moved: MovedParameter) -> str:
@@ -235,10 +232,10 @@ def moved_in_words(moved: MovedParameter) -> str:
 
 def agreement_in_words(axis: str, found: AxisAgreement) -> str:
     """Whether two fits of an axis agree."""
-    total, differing = len(found.differences), len(found.differing)
-    if not differing:
-        return f"axis {axis}: the fits agree in all {total} parameters that can be compared"
-    return f"axis {axis}: the fits differ in {differing} of {total} parameters"
+    total = len(found.differences)
+    if found.differing:
+        return f"axis {axis}: the fits differ in {len(found.differing)} of {total} parameters"
+    return f"axis {axis}: the fits agree in all {total} parameters that can be compared"
 
 
 def difference_in_words(d: Difference) -> str:

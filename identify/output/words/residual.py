@@ -13,11 +13,9 @@ from twin.model.units import units_of
 
 def region_in_words(region: Region) -> str:
     """E.g. "position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, ..."."""
-    return (
-        f"{place_in_words(region)}: {quantity(region.rms, region.force_unit)} RMS, "
-        f"{number(region.ratio)} times the noise floor, {percent(region.share)} of the squared "
-        "error"
-    )
+    rms, share = quantity(region.rms, region.force_unit), percent(region.share)
+    over = f"{number(region.ratio)} times the noise floor"
+    return f"{place_in_words(region)}: {rms} RMS, {over}, {share} of the squared error"
 
 
 def worst_in_words(region: Region) -> str:
@@ -61,6 +59,7 @@ def repeat_in_words(repeat: Repeat) -> str:
     )
 
 
+# Which residual is tested against what, and why.
 EARLIER = "so the residual is tested only against earlier values of command and speed"
 LOOPS = {
     Loop.CLOSED: (
@@ -78,21 +77,14 @@ LOOPS = {
 }
 
 
-def loop_in_words(loop: Loop) -> str:
-    """Which residual is tested against what, and why."""
-    return LOOPS[loop]
-
-
 def correlation_in_words(correlation: Correlation) -> str:
     """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
     other = "its own past" if correlation.signal == "residual" else correlation.signal
     reach = f"±{correlation.limit:.2g} that chance can reach"
-    verdict = (
-        f"none beyond the {reach}"
-        if correlation.passes
-        else f"some beyond the {reach}, so the residual is not noise"
-    )
-    return (
+    said = (
         f"force residual against {other}: {percent(correlation.outside)} of the lags beyond the "
-        f"90 % bounds of ±{correlation.bound:.2g}, {verdict}"
+        f"90 % bounds of ±{correlation.bound:.2g}"
     )
+    if correlation.passes:
+        return f"{said}, none beyond the {reach}"
+    return f"{said}, some beyond the {reach}, so the residual is not noise"
