@@ -229,7 +229,7 @@ def effects(
 
     Example: twin effects cogging --plot cogging.png
     """
-    from identify.output.answers.machine import EffectsAnswer, effect_answer, laws_answer
+    from identify.output.answers.machine import EffectAnswer, EffectsAnswer, laws_answer
     from identify.output.machine import draw, effect_text, effects_text, laws_text
     from twin.effects import load_catalogue
 
@@ -253,11 +253,11 @@ def effects(
             from identify.experiment_design.planting import signature
 
             draw(chosen, *signature(chosen, catalogue), plot)
-        return Said(effect_text(chosen), effect_answer(chosen))
+        return Said(effect_text(chosen), EffectAnswer.of(chosen))
     if plot is not None:
         raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
-    answers = EffectsAnswer(effects=[effect_answer(e) for e in everything])
+    answers = EffectsAnswer.of(effects=everything)
     return Said(effects_text(everything), answers)
 
 

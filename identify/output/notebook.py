@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from identify.output.numbers import Scale, capitalised
@@ -12,6 +11,7 @@ from identify.output.report.effects import fit_table
 from identify.output.report.explorer import coordinate_of_answer, named_signals
 from identify.output.report.page import Block, Chart, Heading, Listing, fragment
 from identify.output.report.subject import Subject
+from identify.output.words.fit import fit_in_words
 from identify.results.results import Comparison, Diagnosis, FitResult
 from identify.results.signals import means
 from twin.errors import InputError
@@ -38,15 +38,13 @@ def tables(result: Diagnosis | Comparison) -> str:
     return fragment(blocks)
 
 
-def parameters(result: FitResult, said: Mapping[str, Iterable[str]]) -> str:
+def parameters(result: FitResult) -> str:
     """What is said of each axis, with its parameters in a table."""
     blocks: list[Block] = []
     for axis, fit in result.fits.items():
-        lines = [capitalised(line.strip()) for line in said[axis]]
-        blocks += [
-            Listing(lines),
-            fit_table(fit.axis, {"Value": result.estimates[axis]}, fit.floor),
-        ]
+        said = [capitalised(line) for line in fit_in_words(result, axis)]
+        table = fit_table(fit.axis, {"Value": result.estimates[axis]}, fit.floor)
+        blocks += [Listing(said), table]
     return fragment(blocks)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
-from identify.estimation.fit import Fit
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, number, quantity
 from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
@@ -21,17 +20,15 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.fit import (
-    OUTCOMES,
     agreement_in_words,
     causes_in_words,
     common_reason,
     difference_in_words,
     estimate_in_words,
+    fit_in_words,
     motion_fit_in_words,
-    no_interval_in_words,
     nonparametric_in_words,
-    prepared_in_words,
-    refit_in_words,
+    over_floor,
 )
 from identify.output.words.plan import (
     experiment_in_words,
@@ -66,54 +63,28 @@ if TYPE_CHECKING:
 SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are printed
 
 
-def over_floor(error: float, floor: float, unit: str) -> str:
-    """E.g. "noise floor 12.7 mN (ratio 4.04)"."""
-    return f"noise floor {quantity(floor, unit)} (ratio {error / floor:.2f})"
-
-
 @text_of.register
 def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
     lines: list[str] = []
-    for axis, fit in result.fits.items():
-        lines += _fitted(result, axis, fit)
+    for axis in result.fits:
+        first, *others = fit_in_words(result, axis)
+        lines += [first, *(f"  {line}" for line in others), *_estimates(result, axis)]
     lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
     return "\n".join(lines)
 
 
-def _fitted(result: FitResult, axis: str, fit: Fit) -> Iterator[str]:
-    yield from fit_lines(result, axis)
-    found = result.estimates[axis]
-    common, hidden = common_reason(found), nonparametric_labels(fit.axis)
+def _estimates(result: FitResult, axis: str) -> Iterator[str]:
+    """The parameters of an axis, a line each; those of a fitted curve together."""
+    model, found = result.fits[axis].axis, result.estimates[axis]
+    common, hidden = common_reason(found), nonparametric_labels(model)
     for e in found:
         if e.label not in hidden:
             value, interval = estimate_in_words(e, common)
             tail = f"90 % in {interval}" if e.low is not None else interval
             yield f"  {e.label:34s} {value:>16s}  {tail}".rstrip()
-    curves = (f for f in fit.axis.effects if f.effect.is_nonparametric)
+    curves = (f for f in model.effects if f.effect.is_nonparametric)
     yield from (f"  {nonparametric_in_words(f)}" for f in curves)
-
-
-def fit_lines(result: FitResult, axis: str) -> Iterator[str]:
-    """What is said of the fit of an axis before its parameters."""
-    fit, still = result.fits[axis], result.left_out[axis]
-    unit, words = fit.axis.units.force, fit.axis.units.words
-    others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
-    known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
-    errors = (f"on the {role.value} logs {quantity(e, unit)}" for role, e in known.items())
-    yield (
-        f"axis {axis}: {words('force error')} {', '.join(errors)}, "
-        f"{over_floor(fit.error, fit.floor, unit)}"
-    )
-    yield f"  {words(OUTCOMES[fit.ended])}"
-    yield from (f"  at its bound: {label}" for label in fit.at_bound)
-    yield from (f"  {said}" for said in prepared_in_words(result.datasets[axis]))
-    if still:
-        yield f"  not fitted on {', '.join(still)}, where axis {axis} stands still"
-    if changed := refit_in_words(result.refits[axis]):
-        yield f"  {changed}"
-    if common := common_reason(result.estimates[axis]):
-        yield f"  {no_interval_in_words(common)}"
 
 
 @text_of.register
@@ -291,17 +262,12 @@ def agree_text(result: Agreement) -> str:
 # --- in a notebook, whose templates and pictures are loaded when they are asked for ----------
 
 
-@html_of.register
-def _parameters(result: FitResult) -> str:
+@html_of.register(FitResult | Comparison | Diagnosis)
+def _tables(result: FitResult | Comparison | Diagnosis) -> str:
     from identify.output import notebook
 
-    return notebook.parameters(result, {axis: fit_lines(result, axis) for axis in result.fits})
-
-
-@html_of.register(Comparison | Diagnosis)
-def _tables(result: Comparison | Diagnosis) -> str:
-    from identify.output import notebook
-
+    if isinstance(result, FitResult):
+        return notebook.parameters(result)
     return notebook.tables(result)
 
 

@@ -23,6 +23,8 @@ from pydantic_core import to_jsonable_python
 SCHEMA = "answers-1"  # the number grows when an entry goes, or gets another meaning
 Number = float | None  # null: not a number, infinite, or none
 File = Annotated[str, BeforeValidator(lambda v: str(v) if isinstance(v, Path) else v)]  # as typed
+LOWER = BeforeValidator(str.lower)  # of the name of an enum's member
+Told = Annotated[str | None, BeforeValidator(lambda v: v or None)]  # null: there is nothing to tell
 
 
 def read(path: str) -> Any:

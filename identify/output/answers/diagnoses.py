@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -10,7 +10,7 @@ from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.links import INERTIAL, WrongBody
-from identify.output.answers.answer import Answer, Entry, File, Number, answer_of, read
+from identify.output.answers.answer import LOWER, Answer, Entry, File, Number, Told, answer_of, read
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
@@ -161,7 +161,7 @@ class CandidateEntry(ValuesEntry):
     unit: str
     supported: bool
     part: Number
-    why_not: str | None
+    why_not: Told
 
 
 class StepEntry(CandidateEntry):
@@ -178,21 +178,19 @@ def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
         "effect": c.effect.name,
         "delta_bic": c.delta_bic if c.score else None,
         "unit": c.fit.axis.units.force,
-        "why_not": why_not(d, c) or None,
+        "why_not": why_not(d, c),
         **_values(c),
     }
 
 
 def _step(d: AxisDiagnosis, index: int) -> StepEntry:
-    step = d.steps[index]
-    given = _candidate(step.tried.candidate, d) | {"effect": step.change.name}
-    return StepEntry.of(
-        step,
-        step.tried.candidate,
-        **given,
-        change=model_change_in_words(step.change),
-        not_named=not_named_in_words(d, index),
-    )
+    step, candidate = d.steps[index], d.steps[index].tried.candidate
+    told = _candidate(candidate, d) | {
+        "effect": step.change.name,
+        "change": model_change_in_words(step.change),
+        "not_named": not_named_in_words(d, index),
+    }
+    return StepEntry.of(step, candidate, **told)
 
 
 # --- findings --------------------------------------------------------------------------------
@@ -304,16 +302,10 @@ class RepeatEntry(Entry):
 
 def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None:
     left, fit = d.unexplained, d.with_named
-    if left is None:
-        return None
-    return RemainderEntry.of(
-        left,
-        fit,
-        period_unit=left.unit,
-        unit=fit.axis.units.force,
-        where=region,
+    return left and RemainderEntry.of(
+        left, fit, period_unit=left.unit, unit=fit.axis.units.force, where=region,
         advice=advice(d.findings),
-    )
+    )  # fmt: skip
 
 
 # --- diagnoses -------------------------------------------------------------------------------
@@ -323,7 +315,7 @@ class DiagnosisEntry(Entry):
     """The diagnosis of an axis."""
 
     axis: str
-    verdict: str
+    verdict: Annotated[str, LOWER] = read("verdict.name")
     explanation: str
     effect: str | None
     """The effect that is named first."""
@@ -450,7 +442,6 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
         d,
         summary,
         axis=axis,
-        verdict=d.verdict.name.lower(),
         explanation=said.verdict,
         effect=d.best.effect.name if d.best else None,
         needed_together=pairs_in_words(d),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
-from identify.output.answers.answer import Answer, Entry, Number, answer_of, read
+from identify.output.answers.answer import LOWER, Answer, Entry, Number, answer_of, read
 from identify.output.words.fit import (
     MOTION_OUTCOMES,
     OUTCOMES,
@@ -17,7 +17,7 @@ from identify.output.words.fit import (
 )
 from identify.output.words.residual import LOOPS, region_in_words
 from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
-from identify.validation.agreement import Agreement, AxisAgreement
+from identify.validation.agreement import Agreement
 from identify.validation.comparison import AxisComparison
 
 # --- fits ------------------------------------------------------------------------------------
@@ -252,19 +252,14 @@ class AgreementAnswer(Answer):
 
 @answer_of.register
 def _(result: Agreement, **more: Any) -> AgreementAnswer:
-    axes = {axis: _agreement(found) for axis, found in result.axes.items()}
+    axes = {}
+    for axis, found in result.axes.items():
+        every = {d.label: DifferenceEntry.of(d, difference=d.b - d.a) for d in found.differences}
+        differing = [d.label for d in found.differing]
+        axes[axis] = AgreementEntry.of(
+            found, agree=not differing, parameters=every, differing=differing
+        )
     return AgreementAnswer.of(result, axes=axes, **more)
-
-
-def _agreement(found: AxisAgreement) -> AgreementEntry:
-    return AgreementEntry.of(
-        found,
-        agree=not found.differing,
-        parameters={
-            d.label: DifferenceEntry.of(d, difference=d.b - d.a) for d in found.differences
-        },
-        differing=[d.label for d in found.differing],
-    )
 
 
 # --- feedforward -----------------------------------------------------------------------------
@@ -361,7 +356,7 @@ class ResidualTestsEntry(Entry):
     """Whether the force residual is noise."""
 
     tested: str
-    loop: Literal["open", "closed", "unknown"]
+    loop: Annotated[Literal["open", "closed", "unknown"], LOWER] = read("loop.name")
     reason: str
     samples: int
     passed: bool = read("passes")
@@ -402,7 +397,6 @@ def _comparison(c: AxisComparison) -> ComparisonEntry:
         residual_tests=ResidualTestsEntry.of(
             t,
             tested=units.words("force residual"),
-            loop=t.loop.name.lower(),
             reason=units.words(LOOPS[t.loop]),
             histogram=HistogramEntry.of(t, unit=units.force, density_unit=units("1/N")),
             correlations={one.signal: one for one in t.correlations},

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from identify.output.answers.answer import Answer, Entry, File, Number, read
+from identify.output.answers.answer import LOWER, Answer, Entry, File, Number, Told, read
 
 if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
     from twin.checks.long import AxisInfo, LogInfo
     from twin.checks.report import CheckReport
-    from twin.effect import Effect
     from twin.laws.verdict import LawReport
 
 
@@ -38,7 +37,7 @@ class EffectEntry(Entry):
     """What the catalogue knows of an effect."""
 
     name: str
-    kind: str
+    kind: Annotated[str, LOWER] = read("kind.name")
     is_nonparametric: bool
     summary: str
     equation: str
@@ -59,17 +58,12 @@ class EffectsAnswer(Answer):
     effects: list[EffectEntry]
 
 
-def effect_answer(effect: Effect) -> EffectAnswer:
-    """Everything the catalogue knows of one effect."""
-    return EffectAnswer.of(effect, kind=effect.kind.name.lower())
-
-
 class LawEntry(Entry):
     """A law of every effect; holds: null where it was not tried."""
 
     law: str
     holds: bool | None
-    fault: str | None
+    fault: Told
 
 
 class LawsAnswer(Answer):
@@ -81,12 +75,8 @@ class LawsAnswer(Answer):
 
 def laws_answer(reports: Sequence[LawReport]) -> LawsAnswer:
     """Whether all laws hold for all effects, and each law."""
-    return LawsAnswer(
-        ok=all(r.ok for r in reports),
-        effects={
-            r.effect: [LawEntry.of(o, fault=o.fault or None) for o in r.outcomes] for r in reports
-        },
-    )
+    effects = {r.effect: r.outcomes for r in reports}
+    return LawsAnswer.of(ok=all(r.ok for r in reports), effects=effects)
 
 
 # --- logs ------------------------------------------------------------------------------------
@@ -96,7 +86,7 @@ class CheckFindingEntry(Entry):
     """A fault of a log."""
 
     severity: Literal["error", "warning"]
-    fault: str
+    fault: Annotated[str, LOWER] = read("fault.name")
     axis: str
     what: str
     where: str
@@ -112,11 +102,8 @@ class CheckAnswer(Answer):
 
 def check_answer(reports: Mapping[str, CheckReport]) -> CheckAnswer:
     """The findings of each log."""
-    logs = {
-        name: [CheckFindingEntry.of(f, fault=f.fault.name.lower()) for f in report.findings]
-        for name, report in reports.items()
-    }
-    return CheckAnswer(ok=all(report.ok for report in reports.values()), logs=logs)
+    logs = {name: report.findings for name, report in reports.items()}
+    return CheckAnswer.of(ok=all(report.ok for report in reports.values()), logs=logs)
 
 
 class ChannelEntry(Entry):
@@ -167,21 +154,17 @@ class InfoAnswer(Answer):
 
 def info_answer(found: Mapping[str, LogInfo]) -> InfoAnswer:
     """By the name of the log."""
-    return InfoAnswer(
-        logs={
-            name: LogInfoEntry.of(
-                info,
-                axes={axis: _axis_info(own) for axis, own in info.axes.items()},
-                findings=[FaultEntry.of(f, text=str(f)) for f in info.check.findings],
-            )
-            for name, info in found.items()
-        }
-    )
+    logs = {}
+    for name, info in found.items():
+        axes = {axis: _axis_info(own) for axis, own in info.axes.items()}
+        findings = [FaultEntry.of(f, text=str(f)) for f in info.check.findings]
+        logs[name] = LogInfoEntry.of(info, axes=axes, findings=findings)
+    return InfoAnswer(logs=logs)
 
 
 def _axis_info(axis: AxisInfo) -> AxisInfoEntry:
     value, unit = axis.constant or (None, None)
-    channels: dict[str, Any] = {c.name: c for c in axis.channels}
+    channels = {c.name: c for c in axis.channels}
     return AxisInfoEntry.of(axis, force_constant=value, force_constant_unit=unit, channels=channels)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from identify.dataset.dataset import Dataset
+from identify.dataset.dataset import Dataset, Role
 from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.estimation.fit import Outcome
@@ -19,7 +19,7 @@ from identify.estimation.intervals import (
 )
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.numbers import Scale, arrow, change, number, percent, quantity
-from identify.results.results import SimulationFit
+from identify.results.results import FitResult, SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
 from twin.model.machine import Fitted
@@ -44,6 +44,31 @@ HELD_OUT_GREW = (
     "The error on logs that were not fitted grew, so the force fit is the better one: noise of the "
     "command, or what the model lacks, adds up to a drift that the parameters have followed."
 )
+
+
+def over_floor(error: float, floor: float, unit: str) -> str:
+    """E.g. "noise floor 12.7 mN (ratio 4.04)"."""
+    return f"noise floor {quantity(floor, unit)} (ratio {error / floor:.2f})"
+
+
+def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
+    """What is said of the fit of an axis before its parameters."""
+    fit, still = result.fits[axis], result.left_out[axis]
+    unit, words = fit.axis.units.force, fit.axis.units.words
+    others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
+    known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
+    errors = (f"on the {role.value} logs {quantity(e, unit)}" for role, e in known.items())
+    floor = over_floor(fit.error, fit.floor, unit)
+    yield f"axis {axis}: {words('force error')} {', '.join(errors)}, {floor}"
+    yield words(OUTCOMES[fit.ended])
+    yield from (f"at its bound: {label}" for label in fit.at_bound)
+    yield from prepared_in_words(result.datasets[axis])
+    if still:
+        yield f"not fitted on {', '.join(still)}, where axis {axis} stands still"
+    if changed := refit_in_words(result.refits[axis]):
+        yield changed
+    if common := common_reason(result.estimates[axis]):
+        yield no_interval_in_words(common)
 
 
 def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | None) -> list[str]:

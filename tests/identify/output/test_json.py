@@ -23,7 +23,7 @@ from strict_json import shipped, strict, told, valid
 
 from identify.estimation.fit import Outcome
 from identify.output.answers.answer import Answer, plain
-from identify.output.answers.machine import check_answer, effect_answer, laws_answer
+from identify.output.answers.machine import EffectAnswer, check_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
 from identify.results.addition import CorrectedBody
@@ -104,7 +104,7 @@ ANSWERS: dict[str, Callable[[], object]] = {
         replace(made.diagnosed().model, mjcf_name="b.xml"), made.diagnosed().model,
         made.wrong_body(), "<inertial/>",
     ),
-    **{f"effect {n}": lambda n=n: effect_answer(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
+    **{f"effect {n}": lambda n=n: EffectAnswer.of(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
     "laws": laws,
     "check": check,
 }  # fmt: skip
@@ -148,7 +148,7 @@ def test_what_is_no_number_or_no_law_is_told() -> None:
     found = told(made.Comparison(made.MODEL, {"x": c}))
     ratio = found["axes"]["x"]["logs"]["run 1"]["position_ratio"]
     assert ratio is None or ratio > 1e200
-    assert effect_answer(CATALOGUE["learned_residual"]).is_nonparametric
+    assert EffectAnswer.of(CATALOGUE["learned_residual"]).is_nonparametric
     empty = built_fit(0.0, 1.0, residual=np.zeros(0))
     assert told(made.diagnosed(made.diagnosis_of(base=empty)))["force_error"] is None
 
