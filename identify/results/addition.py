@@ -51,8 +51,7 @@ class Addition(Printed):
         """The logs that tell most of it: those of the errors that were decided on least."""
         if self.step.test_error_after is not None:
             return Role.TEST
-        held = self.step.holdout_error_after is not None
-        return Role.SELECTION if held else Role.TRAINING
+        return Role.TRAINING if self.step.holdout_error_after is None else Role.SELECTION
 
     def with_notes(self, kept: tuple[str, ...], notes: tuple[str, ...]) -> Addition:
         """The same with its notes; kept: those that go into the history of the model."""
@@ -94,9 +93,7 @@ def addition(
     shape: that of a law of the model which the candidate is; None where it is a missing effect.
     """
     name = best.axis
-    moved = moved_parameters(base, best.fit)
     left = model.axes[name].names
-    set_aside = tuple(n for n in given.axes[name].names if n not in left)
     step = _step(best, base, prepared[name], shape)
     new = model.with_axis(name, best.fit.axis).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
@@ -108,27 +105,23 @@ def addition(
         kept=best.supported,
         position_error=moving,
         replayed=replayed,
-        moved=moved,
-        set_aside=set_aside,
+        moved=moved_parameters(base, best.fit),
+        set_aside=tuple(n for n in given.axes[name].names if n not in left),
         position_log=None if moving is None else next(iter(by_log(prepared))),
     )
 
 
 def _step(best: Candidate, base: Fit, dataset: Dataset, shape: Reshaped | None) -> HistoryStep:
     """What an addition did to the errors on the logs of each role."""
-    (held, held_after), (tested, tested_after) = (
-        [error_if_any(role, f, dataset) for f in (base, best.fit)]
-        for role in (Role.SELECTION, Role.TEST)
-    )
     return HistoryStep(
         action="shape" if shape else "add",
         effect=shape.name if shape else best.effect.name,
         axis=best.axis,
         fit_error_before=base.error,
         fit_error_after=best.fit.error,
-        holdout_error_before=held,
-        holdout_error_after=held_after,
-        test_error_before=tested,
-        test_error_after=tested_after,
+        holdout_error_before=error_if_any(Role.SELECTION, base, dataset),
+        holdout_error_after=error_if_any(Role.SELECTION, best.fit, dataset),
+        test_error_before=error_if_any(Role.TEST, base, dataset),
+        test_error_after=error_if_any(Role.TEST, best.fit, dataset),
         unit=best.fit.axis.units.force,
     )

@@ -72,15 +72,12 @@ def show(replay: Replay, gain: float, speed: float) -> None:
                 stage.draw_others(replay, frame, window.user_scn, player.ghost)
             wide, tall = window.viewport.width, window.viewport.height
             if (wide, tall) != size:
-                size, below = (
-                    (wide, tall),
-                    strips(replay, max(wide, 100), max(int(STRIPS * tall), 100)),
-                )
+                size = wide, tall
+                below = strips(replay, max(wide, 100), max(int(STRIPS * tall), 100))
             beside, marked = panel(replay, frame, gain), at_time(below, frame / len(replay))
-            pictures = [(0, 0, marked), (0, tall - len(beside), beside)]
             window.set_images([
-                (mujoco.MjrRect(left, bottom, p.shape[1], p.shape[0]), p)
-                for left, bottom, p in pictures
+                (mujoco.MjrRect(0, bottom, picture.shape[1], len(picture)), picture)
+                for bottom, picture in ((0, marked), (tall - len(beside), beside))
             ])  # fmt: skip
             corner = mujoco.mjtGridPos.mjGRID_TOPRIGHT
             window.set_texts((None, corner, KEYS, DO.format(speed=player.speed)))

@@ -37,21 +37,22 @@ def joints_spec(machine: MachineModel) -> mujoco.MjSpec:
 
 def _rods(spec: mujoco.MjSpec) -> None:
     """Draw each body as rods from its joint to those that it carries, or beyond its centre."""
-    ends = {body.name: [np.array(child.pos) for child in body.bodies] for body in spec.bodies[1:]}
-    moved = [body for body in spec.bodies[1:] if body.joints or not body.bodies]
-    reach = {b.name: ends[b.name] or [2.0 * np.array(b.ipos)] for b in moved}
-    lengths = [float(np.linalg.norm(end)) for all_ends in reach.values() for end in all_ends]
-    thick = THICK * float(np.mean([n for n in lengths if n > 0.0] or [1.0]))
+    bodies = [
+        (body, [np.array(child.pos) for child in body.bodies] or [2.0 * np.array(body.ipos)])
+        for body in spec.bodies[1:]
+    ]
+    links = [end for body, ends in bodies if body.joints or not body.bodies for end in ends]
+    thick = THICK * float(np.mean([n for n in map(np.linalg.norm, links) if n > 0.0] or [1.0]))
     capsule, cylinder = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
-    for body in spec.bodies[1:]:
-        for end in reach.get(body.name, ends[body.name]):
+    for body, ends in bodies:
+        for end in ends:
             if np.linalg.norm(end) > thick:
                 rod = body.add_geom(type=capsule, rgba=GREY, fromto=[0, 0, 0, *end], mass=0.0)
                 rod.size[0] = 0.5 * thick
         for joint in body.joints:
             along = thick * np.array(joint.axis) / np.linalg.norm(joint.axis)
-            ends_of_axis = [*(joint.pos - along), *(joint.pos + along)]
-            axle = body.add_geom(type=cylinder, rgba=BLUE, fromto=ends_of_axis, mass=0.0)
+            fromto = [*(joint.pos - along), *(joint.pos + along)]
+            axle = body.add_geom(type=cylinder, rgba=BLUE, fromto=fromto, mass=0.0)
             axle.size[0] = thick
 
 
@@ -92,10 +93,8 @@ def dress(spec: mujoco.MjSpec, replay: Replay) -> None:
         add(body, box, [0.12, 0.09, 0.03], [0, 0, 0.07], GREY)
         add(body, box, [0.09, 0.06, 0.015], [0, 0, 0.115], BLUE)
     centre = np.array([0.0, -0.25 * size * (len(spans) - 1), 0.05 * size])
-    spec.stat.center, spec.stat.extent = (
-        centre,
-        size * max(1.2 if slides else 0.6, 0.6 * len(spans)),
-    )
+    spec.stat.center = centre
+    spec.stat.extent = size * max(1.2 if slides else 0.6, 0.6 * len(spans))
     _light(spec, size)
     away = spec.stat.extent * np.array([0.4, -1.5, 1.03])
     spec.worldbody.add_camera(

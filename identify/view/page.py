@@ -88,10 +88,7 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
     joints = [replay.machine.joints.get(axis, axis) for axis in replay.axes]
     names = {int(model.joint(joint).id): i for i, joint in enumerate(joints)}
     chains = [_chain(model, data, body, names) for body in range(model.nbody)]
-    links: list[list] = []
-    for chain in chains:
-        if chain not in links:
-            links.append(chain)
+    links = [chain for i, chain in enumerate(chains) if chain not in chains[:i]]
     link_of = [links.index(chain) for chain in chains]
     meshes: dict[int, int] = {}
     geoms = []
@@ -166,13 +163,8 @@ def _colour(model: mujoco.MjModel, geom: int) -> Array:
 
 def _mesh(model: mujoco.MjModel, mesh: int, most: int) -> dict[str, Any]:
     """A mesh with its vertices on a grid, as fine as its share of bytes allows."""
-    places, corners = (
-        array[begin : begin + count]
-        for array, begin, count in (
-            (model.mesh_vert, int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])),
-            (model.mesh_face, int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])),
-        )
-    )
+    places = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+    corners = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]]
     low = places.min(axis=0)
     for cells, grid, faces in _coarser(places - low, corners):
         size = float(np.ptp(places, axis=0).max()) / cells

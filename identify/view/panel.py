@@ -64,13 +64,8 @@ def strips(replay: Replay, wide: int, tall: int) -> Pixels:
         axes.axis("off")
         most = np.nanmax(np.abs([low, high]), initial=0.0)
         label = f"{name}: {strip.label}, up to {most:.3g} {scale.unit}"
-        axes.text(
-            0.005,
-            1.02,
-            label,
-            transform=axes.transAxes,
-            fontsize=min(9, 20 * tall / 100 / len(named)),
-        )
+        size = min(9, 20 * tall / 100 / len(named))
+        axes.text(0.005, 1.02, label, transform=axes.transAxes, fontsize=size)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

@@ -90,9 +90,9 @@ def _spec(replay: Replay) -> mujoco.MjSpec:
     if machine.joints:
         spec = joints_spec(machine)
     else:
-        bare = {name: replace(axis, effects=()) for name, axis in machine.axes.items()}
         # Where a motion is imposed there is no mass, but a body has one.
-        bare = {name: replace(a, mass=a.mass or 1.0) for name, a in bare.items()}
+        axes = machine.axes.items()
+        bare = {name: replace(a, effects=(), mass=a.mass or 1.0) for name, a in axes}
         spec = machine_spec(replace(machine, axes=bare))
         if not machine.mjcf:
             dress(spec, replay)

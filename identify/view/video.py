@@ -83,8 +83,7 @@ def _nothing_draws() -> InputError:
 
 def _encoder() -> str:
     """The program that makes MP4; raises InputError where there is none."""
-    found = shutil.which("ffmpeg")
-    if found is not None:
+    if found := shutil.which("ffmpeg"):
         return found
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
