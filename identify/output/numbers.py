@@ -82,11 +82,11 @@ def with_band(value: float, band: float, unit: str) -> str:
     return f"{first} ± {second} {scale.unit}".rstrip()
 
 
-def span(low: float, high: float, unit: str, between: str = "and") -> str:
+def span(low: float, high: float, unit: str) -> str:
     """Two SI values in the unit that suits them, e.g. "12.0 and 26.0 mm"."""
     scale = Scale.of(unit, [low, high])
     first, second = scale.within(low, high, low, high)
-    return f"{first} {between} {second} {scale.unit}".rstrip()
+    return f"{first} and {second} {scale.unit}".rstrip()
 
 
 def change(before: float, after: float, unit: str) -> tuple[str, str]:

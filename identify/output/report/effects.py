@@ -108,7 +108,7 @@ def law_shapes(view: AxisView) -> list[Block]:
 def shape_charts(shape: FoundShape) -> list[Chart]:
     """The curve assumed beside the curve found, a chart for each direction."""
     curves = shape.curves.values()
-    scale = Scale.of(shape.force_unit, [value for c in curves for value in (*c.found, *c.assumed)])
+    scale = Scale.of(shape.force_unit, [(c.found, c.assumed) for c in curves])
     along, words = Scale.of(shape.unit, shape.coordinate), units_of(shape.force_unit).words
     within = " within one period" if shape.period is not None else ""
     label = along.label(words(f"{shape.over.value}{within}").capitalize())
@@ -147,11 +147,10 @@ def ranking(view: AxisView) -> list[Block]:
 def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
-    scale = Scale.of(units.force, [e for c in found.ranking for e in (c.gain.before, c.gain.after)])
+    scale = Scale.of(units.force, [(c.gain.before, c.gain.after) for c in found.ranking])
     rows = []
     for rank, c in enumerate(refitted):
-        tone = Tone.PLAIN if c.supported else Tone.MUTED
-        part = max(c.part, 0.0)
+        tone, part = Tone.PLAIN if c.supported else Tone.MUTED, max(c.part, 0.0)
         cells = (
             title_case(c.effect.name),
             number(c.delta_bic),
@@ -186,29 +185,26 @@ def values_of(effect: Effect, model: AxisModel) -> str:
 
 def growth(subject: Subject) -> list[Block]:
     """A picture and a table for each axis with added effects; their position errors if known."""
-    by_axis: dict[str, list[HistoryStep]] = {}
-    for step in subject.history:
-        by_axis.setdefault(step.axis, []).append(step)
     blocks: list[Block] = []
     floors = {view.name: view.floors for view in subject.views}
-    for axis, steps in by_axis.items():
-        if len(by_axis) > 1 or len(subject.views) > 1:
-            blocks.append(Heading(f"Axis {axis}"))
+    axes = dict.fromkeys(step.axis for step in subject.history)
+    for axis in axes:
+        steps = [step for step in subject.history if step.axis == axis]
+        several = len(axes) > 1 or len(subject.views) > 1
+        blocks += [Heading(f"Axis {axis}")] if several else []
         blocks.append(growth_table(steps, floors.get(axis, {})))
-    if subject.additions:
-        blocks.append(_positions(subject.additions))
-    return blocks
+    return [*blocks, _positions(subject.additions)] if subject.additions else blocks
 
 
 def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Table:
     """The errors before and after each step, and the noise floors of the logs of this page."""
-    roles = (Role.TRAINING, Role.SELECTION, Role.TEST)
-    shown = [r for r in roles if r is not Role.TEST or any(r in errors_of_step(s) for s in steps)]
-    scale = Scale.of(steps[0].unit, [e for s in steps for e in errors_of_step(s)[Role.TRAINING]])
+    errors = [errors_of_step(step) for step in steps]
+    tested = [Role.TEST] if any(Role.TEST in own for own in errors) else []
+    shown = [Role.TRAINING, Role.SELECTION, *tested]
+    scale = Scale.of(steps[0].unit, [own[Role.TRAINING] for own in errors])
     rows = []
-    for s in steps:
-        pairs = [errors_of_step(s).get(role, (None, None)) for role in shown]
-        cells = (scale.text(error) for pair in pairs for error in pair)
+    for s, own in zip(steps, errors, strict=True):
+        cells = (scale.text(error) for role in shown for error in own.get(role, (None, None)))
         name = title_case(s.effect) if s.action == "add" else f"{s.action} {spaced(s.effect)}"
         rows.append(Row((name, *cells)))
     if floors:
@@ -261,13 +257,11 @@ def equations(view: AxisView) -> list[Block]:
 
 def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
     """Effects with the model that has values for them."""
-    if view.found is None:
-        return
-    final, tried = view.found.final.axis, {c.effect.name: c for c in view.found.ranking}
-    for name, *tied in view.found.answers:
-        if name in final.names:
-            yield final[name].effect, final
-        yield from ((tried[n].effect, tried[n].fit.axis) for n in tied if n in tried)
+    found = view.found
+    tried = {c.effect.name: c.fit.axis for c in found.ranking} if found else {}
+    for name, *tied in found.answers if found else ():
+        models = [(name, found.final.axis), *((n, tried[n]) for n in tied if n in tried)]
+        yield from ((model[n].effect, model) for n, model in models if n in model.names)
 
 
 # --- parameters ------------------------------------------------------------------------------
@@ -277,11 +271,11 @@ def parameters(view: AxisView) -> list[Block]:
     """A table: with intervals where the model was fitted here."""
     if not (view.found and view.summary):
         return [given_table(view.model)]
-    found, summary = view.found, view.summary
-    sides = {f"Without {view.label}": summary.before, f"With {view.label}": summary.after}
-    new = {c.label for c in found.final.scaling.where} - {c.label for c in found.base.scaling.where}
-    known = sides if view.label else {"Value": summary.before}
-    return [fit_table(found.final.axis, known, summary.floor, new)]
+    found, summary, known = view.found, view.summary, {"Value": view.summary.before}
+    if view.label:
+        known = {f"Without {view.label}": summary.before, f"With {view.label}": summary.after}
+    free, before = ({c.label for c in fit.scaling.where} for fit in (found.final, found.base))
+    return [fit_table(found.final.axis, known, summary.floor, free - before)]
 
 
 def given_table(axis: AxisModel) -> Table:
@@ -314,9 +308,10 @@ def fit_table(
         # Where all values have the same reason, it is in the caption instead of a column.
         common, by_label = common_reason(known), {e.label: e for e in known}
         titles += [heading] if common else [heading, "90 % interval"]
+        if isinstance(common, ModelWrong):
+            common = replace(common, floor=floor)
         if common:
-            told = replace(common, floor=floor) if isinstance(common, ModelWrong) else common
-            remarks.append(f"{heading}: {no_interval_in_words(told)}.")
+            remarks.append(f"{heading}: {no_interval_in_words(common)}.")
         for name, row in cells.items():
             both = estimate_in_words(by_label[name]) if name in by_label else (NOTHING, "")
             row += both[: 1 if common else 2]

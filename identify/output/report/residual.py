@@ -29,23 +29,23 @@ def regions(view: AxisView) -> list[Block]:
     blocks: list[Block] = [regions_table(axis)] if axis.worst else []
     if view.found is not None and view.found.unexplained is not None:
         blocks.append(dependence_table(view.found.unexplained, axis.maps))
-    spectrum = next((m for m in axis.maps if m.coordinate == "frequency"), None)
-    return [*blocks, *([spectrum_chart(spectrum, view.units)] if spectrum else [])]
+    spectra = [m for m in axis.maps if m.coordinate == "frequency"]
+    return blocks + [spectrum_chart(one, view.units) for one in spectra]
 
 
 def regions_table(axis: AxisComparison) -> Table:
     """The regions whose share of the error most exceeds their share of time, in that order."""
-    rows = []
-    for region in axis.worst:
-        cells = (
+    rows = [
+        Row((
             capitalised(place_in_words(region)).removesuffix("."),
             quantity(region.rms, region.force_unit),
             number(region.ratio),
             percent(region.share),
             percent(region.visited),
             percent(region.share - region.visited),
-        )
-        rows.append(Row(cells, bar=region.share))
+        ), bar=region.share)
+        for region in axis.worst
+    ]  # fmt: skip
     titles = (
         "Where", "RMS error", "Times noise floor", "Share of squared error", "Share of time",
         "Difference",
@@ -59,11 +59,10 @@ def regions_table(axis: AxisComparison) -> Table:
 
 def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap]) -> Table:
     """The share of the squared error of each coordinate, the largest first."""
-    ordered = sorted(dependence.shares.items(), key=lambda pair: -pair[1])
     units = {m.coordinate: m.unit for m in maps}
     rows = [
         Row((units_of(units.get(name)).words(spaced(name)), percent(share)), bar=share)
-        for name, share in ordered
+        for name, share in sorted(dependence.shares.items(), key=lambda pair: -pair[1])
         if share >= 0.005  # the least that is not printed as 0 %
     ]
     caption = "Part of what is left that a curve over each coordinate alone accounts for."
@@ -121,12 +120,8 @@ def _histogram(tests: ResidualTests, units: AxisUnits) -> Chart:
         Drawn("normal, of the noise floor", normal, Line.LINE, Ink.AFTER),
     ]
     caption = f"The force residual on {tests.samples} test functions that do not overlap."
-    return Chart(
-        (scale.label(units.words("Force residual")), at),
-        f"Density ({inverse(scale.unit)})",
-        lines,
-        units.words(caption),
-    )
+    along = (scale.label(units.words("Force residual")), at)
+    return Chart(along, f"Density ({inverse(scale.unit)})", lines, units.words(caption))
 
 
 def _correlation(test: Correlation) -> Chart:

@@ -36,10 +36,8 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
     if finding.confidence is None:
         said.append("No confidence is stated, as the test logs do not confirm it")
     else:
-        right = percent(finding.confidence)
-        said.append(
-            f"{right} of answers that remove so much as surely were right where the truth is known"
-        )
+        right = f"{percent(finding.confidence)} of answers that remove so much as surely were right"
+        said.append(f"{right} where the truth is known")
     return tuple(words(text) for text in said)
 
 
@@ -60,13 +58,11 @@ def _explained(finding: Finding) -> str:
         if finding.bend:
             with_it, without = (f"with {value}" for value in _exponents_in_words(finding.bend))
             what = f"{finding.effect} has another shape, which its law {with_it} has: that"
-    errors = f"{without} the {error} is {before}, {with_it} {after}"
+    share = percent(finding.explains)
+    how = f"explains {share} of the squared error above the noise floor"
     if finding.contradicted:
-        return f"{what} is not confirmed by the test logs: {errors}"
-    return (
-        f"{what} explains {percent(finding.explains)} of the squared error above the noise "
-        f"floor: {errors}"
-    )
+        how = "is not confirmed by the test logs"
+    return f"{what} {how}: {without} the {error} is {before}, {with_it} {after}"
 
 
 def _exponents_in_words(bend: FreeExponent) -> list[str]:
@@ -79,12 +75,12 @@ def all_in_words(found: AxisDiagnosis) -> list[str]:
     """Of several findings: what they explain together, and which need each other."""
     if len(found.findings) < 2:
         return []
-    share = percent(found.explained)
-    return [
-        f"together they explain {share} of the squared error above the noise floor; each share "
-        "above is lost when that effect alone is taken out and the others are refitted",
-        *pairs_in_words(found),
-    ]
+    said = (
+        f"together they explain {percent(found.explained)} of the squared error above the noise "
+        "floor; each share above is lost when that effect alone is taken out and the others are "
+        "refitted"
+    )
+    return [said, *pairs_in_words(found)]
 
 
 def pairs_in_words(found: AxisDiagnosis) -> list[str]:
@@ -134,9 +130,8 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
     said = f"What is left is {fitted:.2f} times the noise floor on the training logs"
     if one.chosen.on is not Role.TRAINING:
         said += f" and {chosen:.2f} times on the {one.chosen.on.value} logs"
-    if max(chosen, fitted) < RULE.at_floor:
-        return [f"{said}: noise."]
-    return [f"{said}: something else is missing too."]
+    what = "noise" if max(chosen, fitted) < RULE.at_floor else "something else is missing too"
+    return [f"{said}: {what}."]
 
 
 # --- what to do next --------------------------------------------------------------------------
