@@ -66,19 +66,18 @@ def effect_text(effect: Effect) -> str:
         f"  {p.name:14s} {p.start:>10.4g} {p.unit:10s} [{p.lower:g}, {p.upper:g}]  {p.meaning}"
         for p in effect.parameters
     ]
-    return "\n".join(
-        [
-            f"{effect.name} ({effect.kind.name.lower()}): {effect.summary}",
-            f"equation     {effect.equation}",
-            f"source       {effect.source}",
-            f"fingerprint  {effect.fingerprint}",
-            f"excited by   {effect.excited_by}",
-            "parameters   start value, unit, bounds, meaning",
-            *rows,
-            f"on a rotary axis a unit of m is one of {ROTARY.position}, N of {ROTARY.force}, kg of "
-            f"{ROTARY.mass}",
-        ]
-    )
+    lines = [
+        f"{effect.name} ({effect.kind.name.lower()}): {effect.summary}",
+        f"equation     {effect.equation}",
+        f"source       {effect.source}",
+        f"fingerprint  {effect.fingerprint}",
+        f"excited by   {effect.excited_by}",
+        "parameters   start value, unit, bounds, meaning",
+        *rows,
+        f"on a rotary axis a unit of m is one of {ROTARY.position}, N of {ROTARY.force}, kg of "
+        f"{ROTARY.mass}",
+    ]
+    return "\n".join(lines)
 
 
 def draw(effect: Effect, motion: Motion, force: NDArray[np.float64], path: Path) -> None:
@@ -141,10 +140,10 @@ def _lines(name: str, info: LogInfo) -> list[str]:
         f"{name}: {info.duration:.4g} s, {info.samples} samples at {info.sample_rate:g} Hz, "
         f"{'axis' if len(info.axes) == 1 else 'axes'} {', '.join(info.axes)}"
     ]
-    said = ", ".join(f"{key} {value}" for key, value in info.metadata.items())
-    lines += [f"  written by: {said}"] if said else []
+    if said := ", ".join(f"{key} {value}" for key, value in info.metadata.items()):
+        lines.append(f"  written by: {said}")
     for axis, own in info.axes.items():
-        lines += [f"  axis {axis} ({_about(own)})"]
+        lines.append(f"  axis {axis} ({_about(own)})")
         width = max(len(c.name) for c in own.channels)
         lines += [
             f"    {c.name:{width}s}  {c.least:.6g} to {c.most:.6g} {c.unit}" for c in own.channels

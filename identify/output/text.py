@@ -164,11 +164,9 @@ def _errors(found: AxisDiagnosis, summary: AxisSummary) -> str:
     base, final = found.base.error, found.final.error
     if found.final is found.base:
         return f"on the training logs {quantity(base, unit)}, {over_floor(base, floor, unit)}"
+    errors = f"{arrow(base, final, unit)} with {all_found(found)}"
     ratio = f"ratio {base / floor:.2f} -> {final / floor:.2f}"
-    return (
-        f"on the training logs {arrow(base, final, unit)} with {all_found(found)}, noise floor "
-        f"{quantity(floor, unit)} ({ratio})"
-    )
+    return f"on the training logs {errors}, noise floor {quantity(floor, unit)} ({ratio})"
 
 
 def _candidates(found: AxisDiagnosis) -> Iterator[str]:
@@ -190,18 +188,18 @@ def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
 @text_of.register
 def plan_text(result: Plan) -> str:
     """The question, the chosen experiment and what it is expected to show, and the next best."""
-    supposed, chosen = supposed_in_words(result), result.chosen
+    favoured, chosen = result.favoured, result.chosen
     lines = [
-        f"axis {result.axis}: {question_in_words(result)}",
-        f"  {in_short(chosen.experiment, chosen.units)}",
-        f"  {gap_in_words(result.gap)}",
-        *(f"  {name} is excited by {motion}" for name, motion in result.excited_by.items()),
-        *([f"  the existing logs already favour {result.favoured}"] if result.favoured else []),
-        *([f"  {supposed}"] if supposed else []),
-        *(f"  {experiment_in_words(t, result)}" for t in in_order(result)[:SHOWN]),
-        *(f"  not run: {not_run_in_words(n)}" for n in result.not_run),
+        in_short(chosen.experiment, chosen.units),
+        gap_in_words(result.gap),
+        *(f"{name} is excited by {motion}" for name, motion in result.excited_by.items()),
+        favoured and f"the existing logs already favour {favoured}",
+        supposed_in_words(result),
+        *(experiment_in_words(t, result) for t in in_order(result)[:SHOWN]),
+        *(f"not run: {not_run_in_words(n)}" for n in result.not_run),
     ]
-    return "\n".join(lines)
+    first = f"axis {result.axis}: {question_in_words(result)}"
+    return "\n".join([first, *(f"  {line}" for line in lines if line)])
 
 
 @text_of.register

@@ -261,8 +261,7 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
         summary.noise and aliasing_in_words(summary.noise, units),
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]
-    if axis in result.not_planned:
-        why = result.not_planned[axis]
+    if why := result.not_planned.get(axis):
         every.append(f"no experiment that would tell them apart is proposed: {why}")
     if result.not_tried:
         every.append(
@@ -274,23 +273,22 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
 
 def _about_the_fits(found: AxisDiagnosis, summary: AxisSummary) -> list[str]:
     """That a fit did not converge, and which parameters what was found has moved."""
-    words, converged, said = found.base.axis.units.words, Outcome.CONVERGED, []
-    if found.base.ended is not converged:
-        said.append(words(OUTCOMES[found.base.ended]))
-    if found.final is found.base:
+    words, base, final = found.base.axis.units.words, found.base, found.final
+    said = [words(OUTCOMES[base.ended])] if base.ended is not Outcome.CONVERGED else []
+    if final is base:
         return said
     with_it = f"with {listed([f.effect for f in found.findings])}"
-    if found.final.ended is not converged:
-        said.append(f"{with_it}: {words(OUTCOMES[found.final.ended])}")
+    if final.ended is not Outcome.CONVERGED:
+        said.append(f"{with_it}: {words(OUTCOMES[final.ended])}")
     return said + [f"{with_it}, {words(moved_in_words(m))}" for m in summary.moved]
 
 
 def _beyond_in_words(summary: AxisSummary, error: str) -> list[str]:
     """That the selection logs show what the training logs do not; nothing where they do not."""
-    if summary.selection_ratio is None or summary.selection_ratio < RULE.at_floor:
+    ratio = summary.selection_ratio
+    if ratio is None or ratio < RULE.at_floor:
         return []
     return [
-        f"This holds for the training logs alone: on the selection logs the {error} is "
-        f"{summary.selection_ratio:.1f} times its noise floor. Give such a log as a training log "
-        "too."
+        f"This holds for the training logs alone: on the selection logs the {error} is {ratio:.1f} "
+        "times its noise floor. Give such a log as a training log too."
     ]

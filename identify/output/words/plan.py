@@ -34,30 +34,30 @@ def experiment_in_words(t: SimulatedExperiment, plan: Plan) -> str:
     Only the leading ones are refitted, and the best of these is chosen: one with more evidence than
     the chosen has it from one linear step.
     """
-    tail = f"{number(t.gain)} nats of information on the parameters"
+    shows = f"{number(t.gain)} nats of information on the parameters"
     if len(plan.between) > 1:
         linear = " by one linear step" if t.gain > plan.chosen.gain else ""
         what = "expected evidence (difference of BIC)" if t is plan.chosen else "evidence"
-        tail = f"{what} {number(t.gain)}{linear}, {_rival(t)}"
-    return f"{in_short(t.experiment, t.units)}; takes {quantity(t.duration, 's')}: {tail}"
+        shows = f"{what} {number(t.gain)}{linear}, {_rival(t)}"
+    return f"{_run(t)}: {shows}"
+
+
+def _run(t: SimulatedExperiment) -> str:
+    return f"{in_short(t.experiment, t.units)}; takes {quantity(t.duration, 's')}"
 
 
 def _rival(t: SimulatedExperiment) -> str:
     """What the explanation that is wrong would leave."""
-    return (
-        f"the rival leaves {quantity(t.difference, t.units.force)} RMS unexplained, "
-        f"{number(t.difference / t.floor)} times the noise floor"
-    )
+    left, ratio = quantity(t.difference, t.units.force), number(t.difference / t.floor)
+    return f"the rival leaves {left} RMS unexplained, {ratio} times the noise floor"
 
 
 def next_step_in_words(plan: Plan) -> str:
     """The experiment that an ambiguous diagnosis asks for, in one paragraph."""
     what = "decides" if plan.decides else "comes nearest to deciding, but is too short"
     return (
-        f"The experiment that {what} (twin plan writes it): "
-        f"{in_short(plan.chosen.experiment, plan.chosen.units)}; "
-        f"takes {quantity(plan.chosen.duration, 's')}. There {_rival(plan.chosen)}; "
-        f"{gap_in_words(plan.gap)}."
+        f"The experiment that {what} (twin plan writes it): {_run(plan.chosen)}. There "
+        f"{_rival(plan.chosen)}; {gap_in_words(plan.gap)}."
     )
 
 
