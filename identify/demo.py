@@ -101,10 +101,14 @@ def demo(
     save_model(final, folder / BETTER)
     report = folder / "report.html"
     subject = Subject(
-        f"{model.name}: what the model lacks", diagnosis, diagnosis.comparison, final.history,
+        f"{model.name}: what the model lacks",
+        diagnosis,
+        diagnosis.comparison,
+        final.history,
         [addition] if addition else [],
-        Source(f"twin demo -o {folder} --seed {seed}", model.name, folder), OnMachine(worth=worth),
-    )  # fmt: skip
+        Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
+        OnMachine(worth=worth),
+    )
     write_report(report, subject)
     return Demo(hidden, diagnosis, addition, worth, report)
 

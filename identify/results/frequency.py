@@ -62,10 +62,9 @@ class FrequencyResponse(Printed):
         for name, axis in self.axes.items():
             for source, shown in (("measured", axis.measured), ("model", axis.modelled)):
                 if shown is not None:
-                    r = shown.response
-                    columns = (r.frequency, r.plant.real, r.plant.imag, r.band, r.noise,
-                               r.distortion, r.coherence)  # fmt: skip
-                    yield name, source, dict(zip(COLUMNS, columns, strict=True))
+                    r, plant = shown.response, shown.response.plant
+                    own = (plant.real, plant.imag, r.band, r.noise, r.distortion, r.coherence)
+                    yield name, source, dict(zip(COLUMNS, (r.frequency, *own), strict=True))
 
 
 def _csv(found: FrequencyResponse) -> bytes:

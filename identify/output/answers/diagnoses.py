@@ -301,11 +301,11 @@ class RepeatEntry(Entry):
 
 
 def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None:
-    left, fit = d.unexplained, d.with_named
-    return left and RemainderEntry.of(
-        left, fit, period_unit=left.unit, unit=fit.axis.units.force, where=region,
-        advice=advice(d.findings),
-    )  # fmt: skip
+    if d.unexplained is None:
+        return None
+    units = {"period_unit": d.unexplained.unit, "unit": d.with_named.axis.units.force}
+    said = advice(d.findings)
+    return RemainderEntry.of(d.unexplained, d.with_named, **units, where=region, advice=said)
 
 
 # --- diagnoses -------------------------------------------------------------------------------
@@ -397,8 +397,7 @@ class BodyAnswer(Answer, BodyEntry):
 
 @answer_of.register
 def _(result: CorrectedBody, **more: Any) -> BodyAnswer:
-    own = _of_body(result.body, result.given)
-    file = result.model.mjcf_name
+    own, file = _of_body(result.body, result.given), result.model.mjcf_name
     return BodyAnswer.of(result.body, element=result.element, mujoco=file, **own, **more)
 
 
@@ -416,9 +415,8 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 @answer_of.register
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
+    body = result.body and BodyEntry.of(result.body, **_of_body(result.body, result.model))
     leading = axes[result.leading.dataset.axis]
-    own = result.body
-    body = own and BodyEntry.of(own, **_of_body(own, result.model))
     return DiagnosisAnswer.of(leading, axes=axes, body=body, **more)
 
 

@@ -47,10 +47,8 @@ def write_report(
     """
     require_writable(path)
     warnings = [("Not confirmed", line) for line in assumed] + [("Fault", line) for line in faults]
-    text = whole_page(
-        subject.title, facts(subject), sections(subject), explored(subject), origin(subject),
-        warnings,
-    )  # fmt: skip
+    shown, signals = sections(subject), explored(subject)
+    text = whole_page(subject.title, facts(subject), shown, signals, origin(subject), warnings)
     write_atomically(path, text.encode("utf-8"))
 
 
