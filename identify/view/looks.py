@@ -42,7 +42,8 @@ def _rods(spec: mujoco.MjSpec) -> None:
         for body in spec.bodies[1:]
     ]
     links = [end for body, ends in bodies if body.joints or not body.bodies for end in ends]
-    thick = THICK * float(np.mean([n for n in map(np.linalg.norm, links) if n > 0.0] or [1.0]))
+    lengths = [float(np.linalg.norm(end)) for end in links if end.any()]
+    thick = THICK * float(np.mean(lengths or [1.0]))
     capsule, cylinder = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
     for body, ends in bodies:
         for end in ends:

@@ -257,9 +257,10 @@ def equations(view: AxisView) -> list[Block]:
 
 def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
     """Effects with the model that has values for them."""
-    found = view.found
-    tried = {c.effect.name: c.fit.axis for c in found.ranking} if found else {}
-    for name, *tied in found.answers if found else ():
+    if (found := view.found) is None:
+        return
+    tried = {c.effect.name: c.fit.axis for c in found.ranking}
+    for name, *tied in found.answers:
         models = [(name, found.final.axis), *((n, tried[n]) for n in tied if n in tried)]
         yield from ((model[n].effect, model) for n, model in models if n in model.names)
 

@@ -39,13 +39,6 @@ def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
     assert f"Axis x: force error {ratio} times the noise floor" in text
 
 
-def test_an_addition_is_the_answer_where_nothing_was_diagnosed(case: Case) -> None:
-    first, *_ = answers(case.subject(None))
-    assert first.headline == "Axis x: cogging added"
-    values = " ".join(tile.value for tile in first.tiles)
-    assert quantity(case.addition.position_error[1], "m") in values
-
-
 def ambiguous(case: Case) -> AxisDiagnosis:
     """The diagnosis of the case, had drag explained as much."""
     (found,) = case.x.findings
