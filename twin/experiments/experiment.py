@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,10 +28,9 @@ from twin.model.units import AxisUnits, rotary_unit
 TURN_REST = 0.1  # s of rest of the other axis at each end, as of moves by default
 
 
-def given(unit: str, meaning: str, default: Any = ..., *, zero: bool = False) -> Any:
+def given(unit: str, meaning: str, default: Any = MISSING, *, zero: bool = False) -> Any:
     """A parameter with its unit; positive, or where ``zero`` also zero."""
-    metadata = {"unit": unit, "meaning": meaning, "zero": zero}
-    return field(metadata=metadata) if default is ... else field(default=default, metadata=metadata)
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "zero": zero})
 
 
 def counted(meaning: str) -> Any:
@@ -98,6 +97,19 @@ def machine_limits(model: MachineModel) -> list[Limits]:
 
 
 @dataclass(frozen=True)
+class Driven:
+    """The axis that an experiment moves while all others rest.
+
+    limits: of every axis; index: of the one that moves; place: m, one for each axis.
+    """
+
+    model: MachineModel
+    limits: Sequence[Limits]
+    index: int
+    place: FloatArray
+
+
+@dataclass(frozen=True)
 class OneAxis(Experiment):
     """An experiment on one axis.
 
@@ -107,17 +119,12 @@ class OneAxis(Experiment):
     """
 
     axis: str
+    _: KW_ONLY
     at: tuple[float, ...] | None = field(
-        default=None, kw_only=True, metadata={"unit": "m", "meaning": "place, one for each axis"}
+        default=None, metadata={"unit": "m", "meaning": "place, one for each axis"}
     )
-    effort: float = field(
-        default=1.0, kw_only=True,
-        metadata={"unit": "1", "meaning": "part of the acceleration limit", "zero": False},
-    )  # fmt: skip
-    other: float = field(
-        default=0.0, kw_only=True,
-        metadata={"unit": "m", "meaning": "span of the other axis meanwhile", "zero": True},
-    )  # fmt: skip
+    effort: float = given("1", "part of the acceleration limit", 1.0)
+    other: float = given("m", "span of the other axis meanwhile", 0.0, zero=True)
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         """See Experiment."""
@@ -132,16 +139,13 @@ class OneAxis(Experiment):
                 f"at = {self.at}: give {len(limits)} positions in {unit}, one per axis"
             )
         allowed = [gentle(limit, self.effort) for limit in limits]
-        alone = self.on(allowed, list(model.axes).index(self.axis), place, model)
-        if not self.other:
-            return alone
-        return _with_other(alone, model, self.axis, place, self.other)
+        driven = Driven(model, allowed, list(model.axes).index(self.axis), place)
+        alone = self.on(driven)
+        return _with_other(alone, driven, self.other) if self.other else alone
 
     @abstractmethod
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
-        """The setpoint with the other axis at rest. axis: index; place: m, one per axis."""
+    def on(self, driven: Driven) -> AnySetpoint:
+        """The setpoint with the other axis at rest."""
 
 
 def gentle(limit: Limits, effort: float) -> Limits:
@@ -149,16 +153,14 @@ def gentle(limit: Limits, effort: float) -> Limits:
     return replace(limit, acceleration=effort * limit.acceleration, jerk=effort * limit.jerk)
 
 
-def _with_other(
-    alone: AnySetpoint, model: MachineModel, axis: str, place: FloatArray, span: float
-) -> Setpoint:
+def _with_other(alone: AnySetpoint, driven: Driven, span: float) -> Setpoint:
     """The setpoint with the other axis going back and forth over the span (m) about its place."""
-    names = list(model.axes)
+    model, names = driven.model, list(driven.model.axes)
     if len(names) != 2:
         which = "has no second axis" if len(names) < 2 else f"has {len(names)} axes, not two"
         raise CannotRun(f"other = {span:g}: the machine {which}; leave it out")
-    index = 1 - names.index(axis)
-    ends = np.tile(place, (4, 1))
+    index = 1 - driven.index
+    ends = np.tile(driven.place, (4, 1))
     ends[1:3, index] += 0.5 * span, -0.5 * span
     cycle = point_to_point(machine_limits(model), ends, TURN_REST, model.sample_rate)
     count = len(alone) // len(cycle)

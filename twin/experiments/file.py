@@ -15,7 +15,7 @@ import numpy as np
 import tomlkit
 
 from twin.entries import near, read_toml, shown
-from twin.errors import InputError
+from twin.errors import InputError, at
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
 from twin.experiments.trajectory import AnySetpoint, Setpoint
@@ -36,25 +36,19 @@ def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits =
         document.add(tomlkit.comment(comment))
     table = tomlkit.table()
     table["kind"] = tomlkit.item(kind_of(experiment)).comment(experiment.summary)
+    metadata = {f.name: f.metadata for f in fields(experiment)}
     for name, value in parameters(experiment).items():
-        about = _about(experiment, name, units)
+        about = (units(metadata[name].get("unit", "")), metadata[name].get("meaning"))
         item = tomlkit.item(list(value) if isinstance(value, tuple) else value)
-        table[name] = item.comment(about) if about else item
+        table[name] = item.comment(", ".join(filter(None, about))) if any(about) else item
     document["experiment"] = table
     return tomlkit.dumps(document)
 
 
 def parameters(experiment: Experiment) -> dict[str, Any]:
     """Name -> value of the parameters that are not at their default, SI units."""
-    values = {f.name: getattr(experiment, f.name) for f in fields(experiment)}
-    defaults = {f.name: f.default for f in fields(experiment)}
-    return {n: v for n, v in values.items() if defaults[n] is MISSING or v != defaults[n]}
-
-
-def _about(experiment: Experiment, name: str, units: AxisUnits) -> str:
-    metadata = next(f.metadata for f in fields(experiment) if f.name == name)
-    about = (units(metadata.get("unit", "")), metadata.get("meaning"))
-    return ", ".join(part for part in about if part)
+    given = ((f, getattr(experiment, f.name)) for f in fields(experiment))
+    return {f.name: v for f, v in given if f.default is MISSING or v != f.default}
 
 
 def save_experiment(
@@ -69,14 +63,11 @@ def load_experiment(path: str | Path) -> Experiment:
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such experiment file; `twin plan` writes one, or give a name")
-    document = read_toml(path)
-    table = document.get("experiment")
-    if not isinstance(table, dict):
-        raise InputError(f"{path}: has no [experiment] table; `twin plan` writes one")
-    try:
+    table = read_toml(path).get("experiment")
+    with at(str(path)):
+        if not isinstance(table, dict):
+            raise InputError("has no [experiment] table; `twin plan` writes one")
         return parse_experiment(table)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def parse_experiment(table: Mapping[str, Any]) -> Experiment:
@@ -146,7 +137,8 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
     in open loop the force alone drives the axis. Raises InputError where it cannot be written.
     """
     setpoint = setpoint_of(experiment, model, seed)
-    driven = [i for i in range(len(model.axes)) if _drives(setpoint, i)]
+    forces = setpoint.force if isinstance(setpoint, Setpoint) else np.zeros((1, len(model.axes)))
+    driven = np.flatnonzero(forces.any(axis=0))
     names = ["time [s]"]
     for i, (name, axis) in enumerate(model.axes.items()):
         u = axis.units
@@ -160,11 +152,7 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
             np.savetxt(stream, _table(part, first, driven), fmt="%.9g", delimiter=",")
 
 
-def _drives(setpoint: AnySetpoint, axis: int) -> bool:
-    return isinstance(setpoint, Setpoint) and bool(setpoint.force[:, axis].any())
-
-
-def _table(part: Setpoint, first: int, driven: list[int]) -> np.ndarray:
+def _table(part: Setpoint, first: int, driven: np.ndarray) -> np.ndarray:
     """(n, columns) of some samples, of which the first has that number."""
     columns = [np.arange(first, first + len(part)) / part.sample_rate]
     for i in range(part.position.shape[1]):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
-from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +42,16 @@ def follow_parts(
     noise: draws that of encoders and currents. name, seed: for the log's metadata. controllers: by
     axis; the model's own where None.
     """
-    head = Log(model.sample_rate, {}, _metadata(name, seed), {}, _attachments(model))
+    metadata = {
+        "source": "simulation",
+        "experiment": name,
+        "seed": str(seed),
+        "software": f"proton-twin {software_version()}",
+        "mujoco": software_version("mujoco"),
+    }
+    attachments = {"model.toml": format_model(model).encode()}
+    if model.mjcf:
+        attachments["model.xml"] = model.mjcf.encode()
     currents = _one_after_the_other(noise[1], len(model.axes), len(setpoint))
     first = 0
     for part in run_parts(
@@ -55,7 +63,7 @@ def follow_parts(
             for i, axis in enumerate(model.axes)
         }
         truth = {axis: _truth(axis, part, i) for i, axis in enumerate(model.axes)}
-        yield replace(head, axes=axes, truth=truth)
+        yield Log(model.sample_rate, axes, metadata, truth, attachments)
         first += len(part)
 
 
@@ -79,18 +87,15 @@ def _recorded(
     constant = axis.hardware.force_constant
     noise = axis.hardware.current_noise * rng.standard_normal(len(signals))
     current = signals[:, COMMAND_COLUMN] / constant + noise
-    return AxisLog(
-        columns={
-            "setpoint_position": setpoint.position[:, index].copy(),
-            "setpoint_velocity": setpoint.velocity[:, index].copy(),
-            "setpoint_acceleration": setpoint.acceleration[:, index].copy(),
-            "position": signals[:, READING_COLUMN].copy(),
-            "current": current,
-            "force": constant * current,
-        },
-        units=ROTARY_UNITS if axis.rotary else LINEAR_UNITS,
-        force_constant=constant,
-    )
+    columns = {
+        "setpoint_position": setpoint.position[:, index].copy(),
+        "setpoint_velocity": setpoint.velocity[:, index].copy(),
+        "setpoint_acceleration": setpoint.acceleration[:, index].copy(),
+        "position": signals[:, READING_COLUMN].copy(),
+        "current": current,
+        "force": constant * current,
+    }
+    return AxisLog(columns, ROTARY_UNITS if axis.rotary else LINEAR_UNITS, constant)
 
 
 def _truth(name: str, part: Run, index: int) -> dict[str, Array]:
@@ -101,23 +106,6 @@ def _truth(name: str, part: Run, index: int) -> dict[str, Array]:
         **_of_axis(name, part.table.labels, part.forces),
         **_of_axis(name, part.state_names, part.states),
     }
-
-
-def _metadata(experiment: str, seed: int) -> dict[str, str]:
-    return {
-        "source": "simulation",
-        "experiment": experiment,
-        "seed": str(seed),
-        "software": f"proton-twin {software_version()}",
-        "mujoco": software_version("mujoco"),
-    }
-
-
-def _attachments(model: MachineModel) -> dict[str, bytes]:
-    attachments = {"model.toml": format_model(model).encode()}
-    if model.mjcf:
-        attachments["model.xml"] = model.mjcf.encode()
-    return attachments
 
 
 def _of_axis(axis: str, names: tuple[tuple[str, str], ...], columns: Array) -> dict[str, Array]:

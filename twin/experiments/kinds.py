@@ -15,7 +15,15 @@ from itertools import pairwise
 import numpy as np
 
 from twin.errors import CannotRun, InputError
-from twin.experiments.experiment import Experiment, OneAxis, counted, gentle, given, machine_limits
+from twin.experiments.experiment import (
+    Driven,
+    Experiment,
+    OneAxis,
+    counted,
+    gentle,
+    given,
+    machine_limits,
+)
 from twin.experiments.trajectory import (
     AnySetpoint,
     FloatArray,
@@ -145,12 +153,9 @@ class Passes(OneAxis):
     repeats: int = counted("passes each way")
     dwell: float = given("s", "rest at each end", 0.1, zero=True)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        cycle = _passes(limits, axis, place, self.span, self.speed, self.dwell)
-        return _repeated(cycle, self.repeats, model.sample_rate)
+        return _passes(driven, self.span, self.speed, self.dwell, self.repeats)
 
 
 @dataclass(frozen=True)
@@ -168,21 +173,20 @@ class Staircase(OneAxis):
     longest_plateau: float = given("s", "longest time at one speed", 5.0)
     dwell: float = given("s", "rest before and after each move", 0.1, zero=True)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
         parts: list[Phases] = []
+        limits, own = driven.limits, driven.limits[driven.index]
         for speed in self.speeds:
-            limits[axis].require_plateau(speed, self.span)
-            ramp = limits[axis].ramp_time(speed)
+            own.require_plateau(speed, self.span)
+            ramp = own.ramp_time(speed)
             length = min(self.span, speed * (max(self.longest_plateau, ramp) + ramp))
-            cycle = _there_and_back(limits, axis, place, length / 2.0, speed, self.dwell)
+            cycle = _there_and_back(driven, length / 2.0, speed, self.dwell)
             begin = cycle[-1]  # the rest where it starts and ends
             if parts:
                 parts.append(move(limits, parts[-1].position[-1], begin.position[0]))
             parts += [begin, *cycle]
-        return whole_motion(parts, model.sample_rate)
+        return whole_motion(parts, driven.model.sample_rate)
 
 
 @dataclass(frozen=True)
@@ -195,12 +199,10 @@ class Reversals(OneAxis):
     amplitude: float = given("m", "distance to each side of the place", 4e-6)
     dwell: float = given("s", "rest at each reversal", 0.1, zero=True)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        cycle = _there_and_back(limits, axis, place, self.amplitude, math.inf, self.dwell)
-        return _repeated(cycle, self.repeats, model.sample_rate)
+        cycle = _there_and_back(driven, self.amplitude, math.inf, self.dwell)
+        return _repeated(cycle, self.repeats, driven.model.sample_rate)
 
 
 @dataclass(frozen=True)
@@ -214,11 +216,9 @@ class OpenLoopSine(OneAxis):
     amplitude: float = given("N", "below the breakaway force the motion is pre-sliding", 0.21)
     period: float = given("s", "of the sine", 3.0)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        rate = model.sample_rate
+        rate = driven.model.sample_rate
         require_length(self.duration, rate)
         if self.period < 2.0 / rate:
             raise InputError(
@@ -226,9 +226,9 @@ class OpenLoopSine(OneAxis):
                 f"{2.0 / rate:g} s"
             )
         samples = round(self.duration * rate)
-        still = PlannedSetpoint(rest(place, self.duration), samples, rate).whole
+        still = PlannedSetpoint(rest(driven.place, self.duration), samples, rate).whole
         angle = 2.0 * np.pi / self.period * (np.arange(samples) / rate)
-        return _with_force(still, axis, self.amplitude * np.sin(angle))
+        return _with_force(still, driven, self.amplitude * np.sin(angle))
 
 
 @dataclass(frozen=True)
@@ -245,25 +245,19 @@ class Steps(OneAxis):
     efforts: tuple[float, ...] = given("1", "parts of the acceleration limit, one a round")
     dwell: float = given("s", "rest after each step", 0.05, zero=True)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
         if max(self.efforts) > 1.0:
             raise InputError(
                 f"efforts = {max(self.efforts):g}: give parts of the limit, above 0 up to 1"
             )
         count = max(round(self.span / self.step), 1)
-        way = np.tile(place, (2 * count + 1, 1))
+        way = np.tile(driven.place, (2 * count + 1, 1))
         there = np.linspace(-0.5 * self.span, 0.5 * self.span, count + 1)
-        way[:, axis] += np.concatenate([there, there[-2::-1]])
-        rounds = [
-            point_to_point(
-                [gentle(lim, part) for lim in limits], way, self.dwell, model.sample_rate
-            )
-            for part in self.efforts
-        ]
-        return concatenate(rounds)
+        way[:, driven.index] += np.concatenate([there, there[-2::-1]])
+        slower = ([gentle(limit, part) for limit in driven.limits] for part in self.efforts)
+        rate = driven.model.sample_rate
+        return concatenate([point_to_point(limits, way, self.dwell, rate) for limits in slower])
 
 
 @dataclass(frozen=True)
@@ -276,18 +270,10 @@ class Rests(OneAxis):
     speed: float = given("m/s", "held over at least half of the span")
     rests: tuple[float, ...] = given("s", "before each pair of moves")
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        rounds = [
-            _repeated(
-                _passes(limits, axis, place, self.span, self.speed, 0.5 * seconds), 1,
-                model.sample_rate,
-            )
-            for seconds in self.rests
-        ]  # fmt: skip
-        return concatenate(rounds)
+        rests = (0.5 * seconds for seconds in self.rests)
+        return concatenate([_passes(driven, self.span, self.speed, half, 1) for half in rests])
 
 
 @dataclass(frozen=True)
@@ -308,38 +294,32 @@ class Sweep(OneAxis):
     highest: float = given("Hz", "frequency at the end")
     dwell: float = given("s", "rest at each end", 0.05, zero=True)
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        driven = list(model.axes.values())[axis]
-        allowed, unit = self.most_force(driven), driven.units.force
+        axis, rate = driven.model.axes[self.axis], driven.model.sample_rate
+        allowed, unit = self.most_force(axis), axis.units.force
         if not self.amplitude <= allowed:
             raise CannotRun(
                 f"amplitude = {self.amplitude:g} {unit}: at {self.highest:g} Hz it goes beyond the "
                 f"limits of axis {self.axis}; give at most {allowed:.4g} {unit}, or a lower effort"
             )
-        if not self.lowest < self.highest < 0.5 * model.sample_rate:
+        if not self.lowest < self.highest < 0.5 * rate:
             raise (CannotRun if self.lowest < self.highest else InputError)(
                 f"lowest = {self.lowest:g} Hz, highest = {self.highest:g} Hz: give them in rising "
-                f"order, below half the sample rate of {model.sample_rate:g} Hz"
+                f"order, below half the sample rate of {rate:g} Hz"
             )
-        cycle = _passes(limits, axis, place, self.span, self.speed, self.dwell)
-        passes = _repeated(cycle, self.repeats, model.sample_rate)
-        phase = self._phase(passes.duration, len(passes))
-        return _with_force(passes.whole, axis, self.amplitude * np.sin(phase))
+        passes = _passes(driven, self.span, self.speed, self.dwell, self.repeats)
+        # the frequency grows exponentially
+        growth, samples = math.log(self.highest / self.lowest), len(passes)
+        cycles = self.lowest * passes.duration / growth
+        phase = 2.0 * np.pi * (cycles * np.expm1(growth * np.arange(samples) / samples))
+        return _with_force(passes.whole, driven, self.amplitude * np.sin(phase))
 
     def most_force(self, axis: AxisModel) -> float:
         """Largest amplitude in N that stays within what the moves leave of the axis' limits."""
         h = axis.hardware
         steepest = min(h.acceleration, h.jerk / (2.0 * math.pi * self.highest))
         return min((1.0 - self.effort) * axis.mass * steepest, 0.5 * h.force_limit)
-
-    def _phase(self, duration: float, samples: int) -> np.ndarray:
-        """Phase (samples,) in radians of a sine whose frequency grows exponentially."""
-        growth = math.log(self.highest / self.lowest)
-        cycles = self.lowest * duration / growth * np.expm1(growth * np.arange(samples) / samples)
-        return 2.0 * np.pi * cycles
 
 
 @dataclass(frozen=True)
@@ -362,11 +342,9 @@ class Multisine(OneAxis):
     highest: float = given("Hz", "frequency of the fastest sine")
     phases: int = counted("which random phases; others are another realisation")
 
-    def on(
-        self, limits: Sequence[Limits], axis: int, place: FloatArray, model: MachineModel
-    ) -> AnySetpoint:
+    def on(self, driven: Driven) -> AnySetpoint:
         """See OneAxis."""
-        rate, limit = model.sample_rate, limits[axis]
+        rate, limits = driven.model.sample_rate, driven.limits
         require_length((self.repeats + 2) * self.period, rate)
         samples = round(self.period * rate)
         first, last = (f * samples / rate for f in (self.lowest, self.highest))
@@ -382,10 +360,10 @@ class Multisine(OneAxis):
         turns = np.random.default_rng(self.phases).uniform(0.0, 2.0 * np.pi, len(lines))
         sines[lines] = np.exp(1j * turns) / lines**2
         both = [_begun_and_ended(s, samples, rate, self.repeats) for s in (slow, sines)]
-        motion = both[0] + _most(limit, *both) * both[1]
+        motion = both[0] + _most(limits[driven.index], *both) * both[1]
         columns = np.zeros((3, motion.shape[1], len(limits)))
-        columns[0] = place
-        columns[:, :, axis] += motion[:3]
+        columns[0] = driven.place
+        columns[:, :, driven.index] += motion[:3]
         position = inside_travel(limits, columns[0])
         return Setpoint(position, columns[1], columns[2], np.zeros_like(position), rate)
 
@@ -427,26 +405,22 @@ def _most(limit: Limits, slow: FloatArray, sines: FloatArray) -> float:
     return float(np.min(left[moved] / np.abs(sines[1:][moved])))
 
 
-def _there_and_back(
-    limits: Sequence[Limits], axis: int, place: FloatArray, half: float, speed: float, dwell: float
-) -> list[Phases]:
-    """From `half` (m) below the place to as far above it and back, with a rest after each move.
-
-    speed: m/s, that no axis passes.
-    """
-    ends = np.tile(inside_travel(limits, place), (2, 1))
-    ends[:, axis] += -half, half
-    low, high = inside_travel(limits, ends)
-    slow = [replace(limit, velocity=min(limit.velocity, speed)) for limit in limits]
+def _there_and_back(driven: Driven, half: float, speed: float, dwell: float) -> list[Phases]:
+    """From `half` (m) below the place to as far above it and back, no axis faster than `speed`."""
+    ends = np.tile(inside_travel(driven.limits, driven.place), (2, 1))
+    ends[:, driven.index] += -half, half
+    low, high = inside_travel(driven.limits, ends)
+    slow = [replace(limit, velocity=min(limit.velocity, speed)) for limit in driven.limits]
     return [move(slow, low, high), rest(high, dwell), move(slow, high, low), rest(low, dwell)]
 
 
 def _passes(
-    limits: Sequence[Limits], axis: int, place: FloatArray, span: float, speed: float, dwell: float
-) -> list[Phases]:
-    """Once there and back, the speed held over at least half of the span."""
-    limits[axis].require_plateau(speed, span)
-    return _there_and_back(limits, axis, place, span / 2.0, speed, dwell)
+    driven: Driven, span: float, speed: float, dwell: float, repeats: int
+) -> PlannedSetpoint:
+    """There and back again and again, the speed held over at least half of the span."""
+    driven.limits[driven.index].require_plateau(speed, span)
+    cycle = _there_and_back(driven, span / 2.0, speed, dwell)
+    return _repeated(cycle, repeats, driven.model.sample_rate)
 
 
 def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedSetpoint:
@@ -455,10 +429,10 @@ def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedS
     return whole_motion([cycle[-1], *cycle * repeats], sample_rate)
 
 
-def _with_force(setpoint: Setpoint, axis: int, force: FloatArray) -> Setpoint:
-    """The setpoint with a force (n,), N, on one axis."""
+def _with_force(setpoint: Setpoint, driven: Driven, force: FloatArray) -> Setpoint:
+    """The setpoint with a force (n,), N, on the axis."""
     columns = setpoint.force.copy()
-    columns[:, axis] = force
+    columns[:, driven.index] = force
     return replace(setpoint, force=columns)
 
 

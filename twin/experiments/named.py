@@ -31,7 +31,7 @@ from twin.experiments.lasting import lasting
 from twin.experiments.trajectory import Limits, require_length
 from twin.logs import Log
 from twin.logs.log import joined
-from twin.model.machine import AxisModel, MachineModel
+from twin.model.machine import MachineModel
 from twin.numbers import require_seed
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
 
@@ -163,19 +163,15 @@ def simulate_parts(
     require_seed(seed)
     _, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
     if isinstance(experiment, str):
-        name = experiment
-        attached: dict[str, bytes] = {}
+        name, attached = experiment, dict[str, bytes]()
         seconds = DURATION if duration is None else duration
         chosen = find_experiment(experiment, model, axis, seconds)
     else:
         if duration is not None or axis is not None:
             raise InputError("an experiment has its own duration and axis; leave them out")
         name, chosen = kind_of(experiment), experiment
-        attached = {
-            "experiment.toml": format_experiment(
-                experiment, units=driven_units(experiment, model)
-            ).encode()
-        }
+        text = format_experiment(experiment, units=driven_units(experiment, model))
+        attached = {"experiment.toml": text.encode()}
     setpoint = setpoint_of(chosen, model, seed)
     controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}
     for part in follow_parts(
@@ -190,7 +186,7 @@ class Reach:
 
     def __init__(self, model: MachineModel) -> None:
         self._model = model
-        self._farthest: dict[str, float] = {}
+        self._farthest: dict[str, tuple[float, float, float]] = {}  # and the ends of the travel
 
     def take(self, log: Log) -> Log:
         """Look at the next part, which is returned."""
@@ -198,32 +194,25 @@ class Reach:
             if axis.hardware.travel is None:
                 continue
             low, high = axis.hardware.travel
-            position = np.append(log.truth[name]["position"], self._farthest.get(name, low))
+            before = self._farthest.get(name, (low,))[0]
+            position = np.append(log.truth[name]["position"], before)
             out = np.maximum(low - position, position - high)
-            self._farthest[name] = float(position[np.argmax(out)])
+            self._farthest[name] = float(position[np.argmax(out)]), low, high
         return log
 
     def warnings(self) -> tuple[str, ...]:
         """A sentence for each axis that left its travel."""
-        return tuple(
-            sentence
-            for name, farthest in self._farthest.items()
-            if (sentence := _outside(name, self._model.axes[name], farthest))
-        )
-
-
-def _outside(name: str, axis: AxisModel, farthest: float) -> str | None:
-    units = axis.units
-    assert axis.hardware.travel is not None
-    low, high = axis.hardware.travel
-    if low <= farthest <= high:
-        return None
-    return (
-        f"axis {name} went to {farthest:.6g} {units.position}, outside its travel of "
-        f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
-        f"gently, or check force_limit ({axis.hardware.force_limit:g} {units.force}), "
-        "bandwidth and the effects"
-    )
+        said = []
+        for name, (farthest, low, high) in self._farthest.items():
+            units, hardware = self._model.axes[name].units, self._model.axes[name].hardware
+            if not low <= farthest <= high:
+                said.append(
+                    f"axis {name} went to {farthest:.6g} {units.position}, outside its travel of "
+                    f"{low:g} to {high:g} {units.position}: the drive does not hold it; move more "
+                    f"gently, or check force_limit ({hardware.force_limit:g} {units.force}), "
+                    "bandwidth and the effects"
+                )
+        return tuple(said)
 
 
 def outside_travel(model: MachineModel, log: Log) -> tuple[str, ...]:
