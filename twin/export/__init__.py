@@ -22,28 +22,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Remark:
-    """What a format makes of a part of the model that it cannot hold as it is."""
+    """What a format makes of a part of the model that it cannot hold as it is.
+
+    part: an effect, or another part of the axis such as "mass"; text: what becomes of it and why,
+    in one sentence with units.
+    """
 
     axis: str
-    """The axis whose part it is."""
     part: str
-    """An effect, or another part of the axis such as "mass"."""
     text: str
-    """What becomes of it and why, in one sentence with units."""
 
 
 @dataclass(frozen=True)
 class Exported:
-    """The files of an export, and what they lack of the model."""
+    """The files of an export, and what they lack of the model.
+
+    files: content by name; kept: by axis, what they hold as the model does; approximated: what they
+    hold nearly; lost: what they do not hold.
+    """
 
     files: Mapping[str, str | bytes]
-    """Content by file name."""
     kept: Mapping[str, tuple[str, ...]]
-    """By axis, what the files hold as the model does."""
     approximated: tuple[Remark, ...] = ()
-    """What they hold nearly."""
     lost: tuple[Remark, ...] = ()
-    """What they do not hold."""
 
 
 Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]
@@ -51,14 +52,15 @@ Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]
 
 @dataclass(frozen=True)
 class Exporter:
-    """One format."""
+    """One format.
+
+    summary: what it writes, in a few words; export: (model, logs by name) -> files, which tells on
+    logs what is lost and raises InputError; ending: of the name of a file that every export has.
+    """
 
     summary: str
-    """What it writes, in a few words."""
     export: Export
-    """(model, logs by name) -> files; with logs it tells on them what is lost. Raises InputError"""
     ending: str
-    """Of the name of a file that every export has."""
 
 
 def format_names() -> tuple[str, ...]:

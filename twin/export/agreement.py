@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from twin.errors import InputError
@@ -14,14 +15,16 @@ from twin.model.machine import MachineModel
 
 @dataclass(frozen=True)
 class Outdated:
-    """A file that is not as the model gives it now."""
+    """A file that is not as the model gives it now.
+
+    line: the first that differs, None in a file that is no text; has, gives: that line of the file
+    and of the model, empty where one has ended.
+    """
 
     file: str
     line: int | None
-    """The first that differs; None in a file that is no text."""
     has: str
     gives: str
-    """The line of the file, and that of the model; empty where one has ended."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,7 @@ def _outdated(file: Path, content: str | bytes) -> Iterator[Outdated]:
             yield Outdated(str(file), None, "", "")
         return
     has = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    gives = content.splitlines()
-    for line in range(max(len(has), len(gives))):
-        pair = [lines[line].strip() if line < len(lines) else "" for lines in (has, gives)]
-        if pair[0] != pair[1]:
-            yield Outdated(str(file), line + 1, *pair)
+    for line, (old, new) in enumerate(zip_longest(has, content.splitlines(), fillvalue=""), 1):
+        if old.strip() != new.strip():
+            yield Outdated(str(file), line, old.strip(), new.strip())
             return

@@ -152,18 +152,15 @@ class _Function(Typed):
         said = (ast.get_docstring(self.tree) or "").split("\n\n")[0]
         said = said.replace("*/", "* /").replace("\n", "\n   ")
         head = f"/* {said} */\n" if said else ""
-        body = [f"    {line}" for line in self._block(self.body, name)]
-        lines = [f"static {result} {name}({given})", "{", *own, *unused, *body, "}"]
-        return head + "\n".join(lines)
+        self.name = name
+        lines = [f"static {result} {name}({given})", "{", *own, *unused, *self._block(self.body)]
+        return head + "\n".join([*lines, "}"])
 
-    def _block(self, body: list[ast.stmt], name: str) -> Iterator[str]:
+    def _block(self, body: list[ast.stmt]) -> Iterator[str]:
         for node in body:
-            yield from self._statement(node, name)
+            yield from (f"    {line}" for line in self._statement(node))
 
-    def _indented(self, body: list[ast.stmt], name: str) -> Iterator[str]:
-        yield from (f"    {line}" for line in self._block(body, name))
-
-    def _statement(self, node: ast.stmt, name: str) -> Iterator[str]:
+    def _statement(self, node: ast.stmt) -> Iterator[str]:
         match node:
             case ast.Assign(targets=[ast.Tuple(elts=targets)], value=value):
                 yield from self._unpacked(targets, value)
@@ -171,24 +168,23 @@ class _Function(Typed):
                 yield from self._assigned(target, value)
             case ast.AugAssign(target=target, op=op, value=value) if type(op) in OPERATORS:
                 sign = OPERATORS[type(op)][0]
-                divided = isinstance(op, ast.Div) and self.type_of(target) != REAL
-                if divided:
+                if isinstance(op, ast.Div) and self.type_of(target) != REAL:
                     raise CannotTranslate("a whole number is divided in place")
                 yield f"{self._target(target)} {sign}= {self.expression(value)};"
             case ast.AugAssign(target=target):
                 yield from self._assigned(target, of_augmented(node))
             case ast.If():
-                yield from self._branches(node, name)
+                yield from self._branches(node)
             case ast.For():
-                yield from self._loop(node, name)
+                yield from self._loop(node)
             case ast.While(test=test, orelse=[]):
                 yield f"while ({self.expression(test)}) {{"
-                yield from self._indented(node.body, name)
+                yield from self._block(node.body)
                 yield "}"
             case ast.Return(value=None):
                 yield "return;"
             case ast.Return(value=ast.Tuple(elts=parts)):
-                yield f"return ({name}_result){{{', '.join(map(self.expression, parts))}}};"
+                yield f"return ({self.name}_result){{{', '.join(map(self.expression, parts))}}};"
             case ast.Return(value=ast.expr() as value):
                 yield f"return {self.expression(value)};"
             case ast.Break() | ast.Continue():
@@ -244,20 +240,20 @@ class _Function(Typed):
                 yield f"    {self._target(target)} = {source};"
         yield "}"
 
-    def _branches(self, node: ast.If, name: str) -> Iterator[str]:
+    def _branches(self, node: ast.If) -> Iterator[str]:
         yield f"if ({self.expression(node.test)}) {{"
-        yield from self._indented(node.body, name)
+        yield from self._block(node.body)
         rest = node.orelse
         while len(rest) == 1 and isinstance(rest[0], ast.If):
             yield f"}} else if ({self.expression(rest[0].test)}) {{"
-            yield from self._indented(rest[0].body, name)
+            yield from self._block(rest[0].body)
             rest = rest[0].orelse
         if rest:
             yield "} else {"
-            yield from self._indented(rest, name)
+            yield from self._block(rest)
         yield "}"
 
-    def _loop(self, node: ast.For, name: str) -> Iterator[str]:
+    def _loop(self, node: ast.For) -> Iterator[str]:
         match node:
             case ast.For(
                 target=ast.Name(id=counter),
@@ -276,7 +272,7 @@ class _Function(Typed):
         own = _safe(counter)
         end = self.expression(last)
         yield f"for ({WHOLE} {own} = {begin}; {own} < {end}; {own}++) {{"
-        yield from self._indented(node.body, name)
+        yield from self._block(node.body)
         yield "}"
 
     def expression(self, node: ast.expr, wanted: Type = None) -> str:

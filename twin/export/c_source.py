@@ -54,14 +54,11 @@ class CSource:
     @property
     def kept(self) -> dict[str, tuple[str, ...]]:
         """By axis, what is kept as it is."""
-        nearly = {(r.axis, r.part) for r in self.approximated}
-        return {
-            a.name: (
-                a.axis.units.mass_name,
-                *(n for n in a.axis.names if (a.name, n) not in nearly),
-            )
-            for a in self.axes
-        }
+        nearly, kept = {(r.axis, r.part) for r in self.approximated}, {}
+        for a in self.axes:
+            effects = (n for n in a.axis.names if (a.name, n) not in nearly)
+            kept[a.name] = (a.axis.units.mass_name, *effects)
+        return kept
 
 
 def c_source(model: MachineModel) -> CSource:
@@ -73,9 +70,7 @@ def c_source(model: MachineModel) -> CSource:
         )
     model.require_mass()
     name, names, laws = identifier(model.name), axis_identifiers(model), CLaws()
-    axes: list[AxisCode] = []
-    approximated: list[Remark] = []
-    lost: list[Remark] = []
+    axes, approximated, lost = list[AxisCode](), list[Remark](), list[Remark]()
     for axis_name, axis in model.axes.items():
         found = followed(axis)
         made, left = [], dict(found.lost)
@@ -92,29 +87,20 @@ def c_source(model: MachineModel) -> CSource:
         approximated += [Remark(axis_name, *item) for item in nearly.items()]
         lost += [Remark(axis_name, *item) for item in left.items()]
         prefix = f"{name}_{names[axis_name]}"
-        more = tuple(f"other_{m}" for m in MOTION) if _reads_other(made) else ()
+        other = any(f.effect.reads_other_axis for f, _ in made)
+        more = tuple(f"other_{m}" for m in MOTION) if other else ()
         ahead = 0.5 * model.period + found.late
         axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), (*MOTION, *more), ahead))
-    remarks = tuple(approximated), tuple(lost)
-    return CSource(
-        name, _header(model, name, axes, *remarks), _source(model, name, axes, laws), tuple(axes),
-        *remarks,
-    )  # fmt: skip
-
-
-def _reads_other(made: list[tuple[Fitted, str]]) -> bool:
-    return any(f.effect.reads_other_axis for f, _ in made)
+    header = _header(model, name, axes, approximated, lost)
+    source = _source(model, name, axes, laws)
+    return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))
 
 
 # --- the header -----------------------------------------------------------------------------------
 
 
 def _header(
-    model: MachineModel,
-    name: str,
-    axes: list[AxisCode],
-    approximated: tuple[Remark, ...],
-    lost: tuple[Remark, ...],
+    model: MachineModel, name: str, axes: list[AxisCode], nearly: list[Remark], lost: list[Remark]
 ) -> str:
     guard = f"{name.upper()}_H"
     parts = [
@@ -123,13 +109,13 @@ def _header(
         f"#ifndef {guard}\n#define {guard}",
         "#ifdef __cplusplus\nextern \"C\" {\n#endif",
         f"#define {name.upper()}_PERIOD {model.period!r} /* s, from one call to the next */",
-        *(_declared(a, approximated, lost) for a in axes),
+        *(_declared(a, nearly, lost) for a in axes),
         "#ifdef __cplusplus\n}\n#endif\n#endif",
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
 
 
-def _declared(a: AxisCode, approximated: tuple[Remark, ...], lost: tuple[Remark, ...]) -> str:
+def _declared(a: AxisCode, nearly: list[Remark], lost: list[Remark]) -> str:
     units = a.axis.units
     said = [
         f"{units.words('Force').capitalize()} in {units.force} that moves axis {_plain(a.name)} "
@@ -137,15 +123,15 @@ def _declared(a: AxisCode, approximated: tuple[Remark, ...], lost: tuple[Remark,
         f"{units.acceleration}.",
         "Call it once a period with the setpoint, never with the measurement.",
         *(f"{what}: {r.part}, {_plain(r.text)}." for what, remarks in
-          (("Approximated", approximated), ("Lost", lost)) for r in remarks if r.axis == a.name),
+          (("Approximated", nearly), ("Lost", lost)) for r in remarks if r.axis == a.name),
     ]  # fmt: skip
-    states = [f"    double {m}[{n}];" for m, n in _memories(a)]
+    memories = {f.effect.name: len(f.effect.states) for f, _ in a.laws if f.effect.states}
     lines = [
         "/* s: give the setpoint of so much later: a command is held, a drive may be late. */\n"
         f"#define {a.prefix.upper()}_AHEAD {a.ahead!r}\n",
         f"/* Memory of axis {_plain(a.name)}: begin with {a.prefix}_state state = {{0}}; */",
         f"typedef struct {{\n    double calls;\n    double friction; /* {units.force} */",
-        *states,
+        *(f"    double {member}[{count}];" for member, count in memories.items()),
         f"}} {a.prefix}_state;\n",
         "/* " + "\n   ".join(said) + " */",
         f"{_signature(a, 'force')};",
@@ -153,13 +139,6 @@ def _declared(a: AxisCode, approximated: tuple[Remark, ...], lost: tuple[Remark,
     if a.axis.hardware.force_constant != 1.0:
         lines += [f"\n/* The same as a current in A. */\n{_signature(a, 'current')};"]
     return "\n".join(lines)
-
-
-def _memories(a: AxisCode) -> Iterator[tuple[str, int]]:
-    """Members of the state and how many numbers each has."""
-    for f, _ in a.laws:
-        if f.effect.states:
-            yield f.effect.name, len(f.effect.states)
 
 
 def _signature(a: AxisCode, what: str) -> str:
@@ -262,9 +241,7 @@ def _body(model: MachineModel, name: str, a: AxisCode) -> Iterator[str]:
     yield "return command;"
 
 
-def _structure(
-    model: MachineModel, a: AxisCode, laws: list[tuple[Fitted, str]]
-) -> Iterator[str]:  # fmt: skip
+def _structure(model: MachineModel, a: AxisCode, laws: list[tuple[Fitted, str]]) -> Iterator[str]:
     """Statements that add the force of attached masses: twin.core.native.along for one sample."""
     if not laws:
         return

@@ -17,7 +17,7 @@ from twin.errors import InputError
 from twin.experiments.follow import recorded_setpoint
 from twin.experiments.named import find_experiment
 from twin.experiments.trajectory import AnySetpoint
-from twin.export import Remark
+from twin.export import Exported, Remark
 from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -35,14 +35,11 @@ EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses wh
 
 @dataclass(frozen=True, eq=False)
 class Periodic:
-    """The force that balances an effect which repeats along the track."""
+    """The force (ENTRIES,) N, from position 0 on, that balances an effect of that period (m)."""
 
     name: str
-    """Of the effect."""
     period: float
-    """m."""
     force: Array
-    """(ENTRIES,) N, from position 0 on."""
 
     def harmonics(self, least: float = 0.01) -> dict[int, complex]:
         """Harmonics of at least that part of the largest: cosine term - i sine term, N."""
@@ -54,22 +51,20 @@ class Periodic:
 
 @dataclass(frozen=True, eq=False)
 class AxisTables:
-    """The force that an axis needs, as a sum of tables."""
+    """The force that an axis needs, as a sum of tables.
+
+    mass: kg, times the acceleration. along: (n,) N at positions (n,) m, the same in both
+    directions. forwards, backwards: (k,) N at speeds (k,) m/s from 0 on, added while the axis moves
+    that way, backwards negative for a friction. periodic: what repeats along the track.
+    """
 
     mass: float
-    """kg, times the acceleration."""
     positions: Array
-    """(n,) m."""
     along: Array
-    """(n,) N, the same in both directions."""
     speeds: Array
-    """(k,) m/s, from 0 on."""
     forwards: Array
-    """(k,) N, added while the axis moves forwards."""
     backwards: Array
-    """(k,) N, added while it moves backwards: negative for a friction."""
     periodic: tuple[Periodic, ...]
-    """What repeats along the track."""
 
     def force(self, motion: Array) -> Array:
         """Force (n,) N along a motion (3, n): position m, velocity m/s, acceleration m/s^2."""
@@ -90,13 +85,14 @@ class AxisTables:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion on which losses are told."""
+    """A motion on which losses are told; period: s.
+
+    setpoints: by axis (3, n), position m, velocity m/s, acceleration m/s^2.
+    """
 
     name: str
     period: float
-    """s."""
     setpoints: Mapping[str, Array]
-    """By axis (3, n): position m, velocity m/s, acceleration m/s^2."""
 
 
 def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
@@ -104,31 +100,25 @@ def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
     if model.joints:
         raise InputError(f"{model.name}: its axes are joints; give a model of axes with a mass")
     model.require_mass()
-    given: dict[str, tuple[AnySetpoint, float]] = {
-        name: (recorded_setpoint(model, log), log.period) for name, log in logs.items()
-    }
+    given: dict[str, AnySetpoint] = {n: recorded_setpoint(model, log) for n, log in logs.items()}
     if not given:
         planned = find_experiment(EXPERIMENT, model, duration=DURATION)
-        setpoint = planned.setpoint(model, np.random.default_rng(SEED))
-        given[f"simulated {EXPERIMENT}"] = setpoint, model.period
-    return [
-        Motion(
-            name,
-            period,
-            {
-                axis: np.stack([s.position[:, i], s.velocity[:, i], s.acceleration[:, i]])
-                for i, axis in enumerate(model.axes)
-            },
-        )
-        for name, (s, period) in given.items()
-    ]
+        given[f"simulated {EXPERIMENT}"] = planned.setpoint(model, np.random.default_rng(SEED))
+    found = []
+    for name, s in given.items():
+        by_axis = np.stack([s.position, s.velocity, s.acceleration]).transpose(2, 0, 1).copy()
+        found.append(Motion(name, 1.0 / s.sample_rate, dict(zip(model.axes, by_axis, strict=True))))
+    return found
 
 
 def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTables:
     """The tables of an axis over ``reach``, m,, up to a speed in m/s."""
-    steady = _steady(axis)
-    repeated = tuple(f for f in steady.effects if _repeats(f))
-    passed = replace(steady, effects=tuple(f for f in steady.effects if f not in repeated))
+    shown = [
+        f for f in followed(axis).axis.effects
+        if f.effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)
+        and not f.effect.reads("TIME")
+    ]  # fmt: skip
+    passed = replace(axis, effects=tuple(f for f in shown if not _repeats(f)))
     positions = np.linspace(*reach, PLACES)
     speeds = speed * np.linspace(0.0, 1.0, SPEEDS) ** 2
     runs = np.maximum(speeds, 1e-6 * speed)
@@ -141,19 +131,7 @@ def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTab
     )
     return AxisTables(
         axis.weighed.mass, positions, along, speeds, forwards, backwards,
-        tuple(_of_one_period(steady, f) for f in repeated),
-    )  # fmt: skip
-
-
-def _steady(axis: AxisModel) -> AxisModel:
-    """The axis with the effects that a pass at a steady speed shows."""
-    shown = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)
-    return replace(
-        axis,
-        effects=tuple(
-            f for f in followed(axis).axis.effects
-            if f.effect.kind in shown and not f.effect.reads("TIME")
-        ),
+        tuple(_of_one_period(axis, f) for f in shown if _repeats(f)),
     )  # fmt: skip
 
 
@@ -180,9 +158,8 @@ def _of_one_period(axis: AxisModel, fitted: Fitted) -> Periodic:
     motion = np.zeros((3, ENTRIES))
     motion[0] = period * np.arange(ENTRIES) / ENTRIES
     alone = replace(axis, effects=(fitted,))
-    return Periodic(
-        fitted.effect.name, period, feedforward(alone, motion, np.zeros_like(motion), 1.0)
-    )
+    force = feedforward(alone, motion, np.zeros_like(motion), 1.0)
+    return Periodic(fitted.effect.name, period, force)
 
 
 def fewest_points(speeds: Array, force: Array, count: int) -> tuple[Array, float]:
@@ -219,10 +196,27 @@ class Judged:
     lost: tuple[Remark, ...]
 
 
-def judged(
-    model: MachineModel, name: str, given: list[Motion], made: Callable[[AxisTables], AxisTables]
-) -> Judged:
-    """The tables that a format makes of an axis, and by effect what they lose on given motions."""
+Made = Callable[[AxisTables], AxisTables]
+"""What a format makes of the tables of an axis."""
+
+
+def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dict[str, Judged]:
+    """The tables that a format makes of each axis, and by effect what they lose on the logs."""
+    given = motions(model, logs)
+    return {name: _judged(model, name, given, made) for name in model.axes}
+
+
+def exported(files: Mapping[str, str | bytes], found: Mapping[str, Judged]) -> Exported:
+    """Files that were made of the tables."""
+    return Exported(
+        files,
+        {name: own.kept for name, own in found.items()},
+        tuple(r for own in found.values() for r in own.approximated),
+        tuple(r for own in found.values() for r in own.lost),
+    )
+
+
+def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> Judged:
     axis, others = model.axes[name], [a for a in model.axes if a != name]
     ends = np.concatenate([m.setpoints[name][0] for m in given])
     reach = axis.hardware.travel or (float(ends.min()), float(ends.max()))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from twin.export import Exported, Exporter, axis_identifiers
-from twin.export.tables import AxisTables, judged, motions
+from twin.export.tables import AxisTables, exported, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array
@@ -15,18 +15,11 @@ from twin.signals import Array
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """A file for each table of each axis."""
-    given = motions(model, logs)
-    found = {name: judged(model, name, given, lambda t: t) for name in model.axes}
+    found, names = judged_axes(model, logs, lambda tables: tables), axis_identifiers(model)
     files: dict[str, str | bytes] = {}
-    names = axis_identifiers(model)
     for name, axis in model.axes.items():
         files |= _files(names[name], axis, found[name].tables)
-    return Exported(
-        files,
-        {name: own.kept for name, own in found.items()},
-        tuple(r for own in found.values() for r in own.approximated),
-        tuple(r for own in found.values() for r in own.lost),
-    )
+    return exported(files, found)
 
 
 def _files(name: str, axis: AxisModel, of: AxisTables) -> dict[str, str]:

@@ -55,13 +55,8 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
 
 
 def _inputs(a: AxisCode) -> list[Signal]:
-    units = a.axis.units
-    own = {"position": units.position, "velocity": units.velocity,
-           "acceleration": units.acceleration}  # fmt: skip
-    return [
-        (f"{identifier(a.name)}_{n}", own[n.removeprefix("other_")], f"setpoint, {n}")
-        for n in a.arguments
-    ]
+    units = {n: getattr(a.axis.units, n.removeprefix("other_")) for n in a.arguments}
+    return [(f"{identifier(a.name)}_{n}", unit, f"setpoint, {n}") for n, unit in units.items()]
 
 
 def _outputs(a: AxisCode) -> list[Signal]:

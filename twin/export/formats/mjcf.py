@@ -28,6 +28,7 @@ from twin.signals import Array, between
 Attributes = Mapping[str, float]
 KEPT = 0.01  # least part of an effect's force that is told to be lost
 HALF = 0.5  # where more is lost than held, the effect is called lost
+UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
 SWING, SAMPLE = 10.0, 1e-3  # s, of the sine over the travel on which losses are told without a log
 
 
@@ -88,9 +89,7 @@ def _judged(
     motions = [_motion(log.axes[axis].position, log.period) for log in logs.values()]
     on = ", ".join(logs) or "a sine over its travel"
     motions = motions or [_swing(own)]
-    kept: list[str] = []
-    nearly: list[Remark] = []
-    lost: list[Remark] = []
+    kept, nearly, lost = list[str](), list[Remark](), list[Remark]()
     for f in own.effects:
         alone = AxisModel(own.mass, effects=(f,), rotary=own.rotary)
         held = f.effect.joint_attributes(f.values) if f.effect.joint_attributes else {}
@@ -101,10 +100,7 @@ def _judged(
         if held and left <= KEPT * size:
             kept.append(f.effect.name)
         elif size == 0.0:
-            text = (
-                "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
-            )
-            lost.append(Remark(axis, f.effect.name, text))
+            lost.append(Remark(axis, f.effect.name, UNKNOWN))
         else:
             text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {on}"
             (lost if left > HALF * size else nearly).append(Remark(axis, f.effect.name, text))

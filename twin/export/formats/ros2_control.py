@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from twin.export import Exported, Exporter, axis_identifiers, identifier
-from twin.export.tables import AxisTables, judged, motions
+from twin.export.tables import AxisTables, exported, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -23,20 +23,15 @@ UNLIMITED = 1e9  # N, where the model has no force limit: URDF asks for a number
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """The limits as YAML, and the joints as a piece of a robot's description."""
-    given = motions(model, logs)
-    found = {name: judged(model, name, given, _straight) for name in model.axes}
+    found = judged_axes(model, logs, _straight)
     name, names = identifier(model.name), axis_identifiers(model)
     limits, joints = ["joint_limits:"], []
     for axis, own in model.axes.items():
         limits += [f"  {names[axis]}:", *(f"    {line}" for line in _limits(own))]
         joints.append(_joint(names[axis], own, found[axis].tables))
     described = "\n".join([f"<robot name={quoteattr(name)}>", *joints, "</robot>\n"])
-    return Exported(
-        {f"{name}_joint_limits.yaml": "\n".join(limits) + "\n", f"{name}_joints.urdf": described},
-        {axis: own.kept for axis, own in found.items()},
-        tuple(r for own in found.values() for r in own.approximated),
-        tuple(r for own in found.values() for r in own.lost),
-    )
+    limited = "\n".join(limits) + "\n"
+    return exported({f"{name}_joint_limits.yaml": limited, f"{name}_joints.urdf": described}, found)
 
 
 def _straight(of: AxisTables) -> AxisTables:
@@ -47,14 +42,12 @@ def _straight(of: AxisTables) -> AxisTables:
     if damping < 0.0:
         level, damping = float(of.odd[1:].mean()), 0.0
     odd = max(level, 0.0) + damping * of.speeds
-    return replace(
-        of, along=np.zeros_like(of.along), forwards=odd, backwards=-odd, periodic=()
-    )  # fmt: skip
+    still = np.zeros_like(of.along)
+    return replace(of, along=still, forwards=odd, backwards=-odd, periodic=())
 
 
 def _limits(axis: AxisModel) -> list[str]:
-    hardware = axis.hardware
-    lines = []
+    hardware, lines = axis.hardware, []
     if hardware.travel is not None:
         low, high = hardware.travel
         lines += ["has_position_limits: true", f"min_position: {low!r}", f"max_position: {high!r}"]
@@ -77,15 +70,11 @@ def _joint(name: str, axis: AxisModel, of: AxisTables) -> str:
     damping = float((of.odd[-1] - level) / of.speeds[-1])
     ends = 'lower="{!r}" upper="{!r}" '.format(*hardware.travel) if hardware.travel else ""
     effort = min(hardware.force_limit, UNLIMITED)
-    return "\n".join(
-        [
-            f'  <joint name="{name}" type="{kind}">',
-            f'    <limit {ends}velocity="{hardware.velocity!r}" effort="{effort!r}"/>',
-            f"    <!-- friction {units.force}, damping {units('N s/m')} -->",
-            f'    <dynamics friction="{level:.9g}" damping="{damping:.9g}"/>',
-            "  </joint>",
-        ]
-    )
+    return f"""  <joint name="{name}" type="{kind}">
+    <limit {ends}velocity="{hardware.velocity!r}" effort="{effort!r}"/>
+    <!-- friction {units.force}, damping {units("N s/m")} -->
+    <dynamics friction="{level:.9g}" damping="{damping:.9g}"/>
+  </joint>"""
 
 
 EXPORTER = Exporter(

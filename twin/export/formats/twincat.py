@@ -14,7 +14,14 @@ import numpy as np
 
 from twin.export import Exported, Exporter, Remark, axis_identifiers
 from twin.export.formats.csv import csv_text
-from twin.export.tables import ENTRIES, AxisTables, Judged, fewest_points, judged, motions
+from twin.export.tables import (
+    ENTRIES,
+    AxisTables,
+    Judged,
+    exported,
+    fewest_points,
+    judged_axes,
+)
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -25,20 +32,14 @@ WHOLE = 1000  # P-COMP-00045: 100.0 %
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """For each axis a compensation value list, and a file for each effect that repeats."""
-    given = motions(model, logs)
-    found = {name: judged(model, name, given, _held) for name in model.axes}
+    found, names = judged_axes(model, logs, _held), axis_identifiers(model)
     files: dict[str, str | bytes] = {}
     nearly: list[Remark] = []
-    names = axis_identifiers(model)
     for name, axis in model.axes.items():
         files |= _files(names[name], axis, found[name])
         nearly += [Remark(name, "friction table", _points(axis, found[name].tables))]
-    return Exported(
-        files,
-        {name: own.kept for name, own in found.items()},
-        (*nearly, *(r for own in found.values() for r in own.approximated)),
-        tuple(r for own in found.values() for r in own.lost),
-    )
+    made = exported(files, found)
+    return replace(made, approximated=(*nearly, *made.approximated))
 
 
 def _held(of: AxisTables) -> AxisTables:
