@@ -14,16 +14,16 @@ from twin.model.units import AxisUnits, rotary_unit, units_of
 
 Array = NDArray[np.float64]
 
-FIELDS = (
-    "setpoint_position",
-    "setpoint_velocity",
-    "setpoint_acceleration",
-    "position",
-    "velocity",
-    "current",
-    "force",
-)
-LINEAR_UNITS = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m", "m/s", "A", "N"), strict=True))
+LINEAR_UNITS = {
+    "setpoint_position": "m",
+    "setpoint_velocity": "m/s",
+    "setpoint_acceleration": "m/s^2",
+    "position": "m",
+    "velocity": "m/s",
+    "current": "A",
+    "force": "N",
+}
+FIELDS = tuple(LINEAR_UNITS)
 ROTARY_UNITS = {name: rotary_unit(unit) for name, unit in LINEAR_UNITS.items()}
 
 
@@ -107,11 +107,8 @@ class Log:
             if len(c)
         )
         titles = "".join(f"<th>{t}</th>" for t in ("axis", "signal", "unit", "least", "most"))
-        seconds = len(self) * self.period
-        return (
-            f"<p>{seconds:.4g} s at {self.sample_rate:g} Hz</p>\n<table>\n<tr>{titles}</tr>\n"
-            f"{rows}</table>"
-        )
+        extent = f"{len(self) * self.period:.4g} s at {self.sample_rate:g} Hz"
+        return f"<p>{extent}</p>\n<table>\n<tr>{titles}</tr>\n{rows}</table>"
 
     def part(self, first: int, stop: int) -> Log:
         """Its samples from number ``first`` to before ``stop``."""
@@ -151,15 +148,20 @@ class Log:
 
 def joined(parts: Iterable[Log]) -> Log:
     """One log of parts that follow each other without a gap, which all have the same columns."""
-    logs = list(parts)
-    first = logs[0]
-    if len(logs) == 1:
+    first, *others = parts
+    if not others:
         return first
+
+    def one_after_the_other(columns: Iterable[Mapping[str, Array]]) -> dict[str, Array]:
+        head, *more = columns
+        return {name: np.concatenate([c, *(m[name] for m in more)]) for name, c in head.items()}
+
+    logs = [first, *others]
     axes = {
-        name: replace(axis, columns=_one_after_the_other([log.axes[name].columns for log in logs]))
+        name: replace(axis, columns=one_after_the_other(log.axes[name].columns for log in logs))
         for name, axis in first.axes.items()
     }
-    truth = {name: _one_after_the_other([log.truth[name] for log in logs]) for name in first.truth}
+    truth = {name: one_after_the_other(log.truth[name] for log in logs) for name in first.truth}
     return replace(first, axes=axes, truth=truth)
 
 
@@ -174,10 +176,6 @@ def in_multiples(parts: Iterable[Log], count: int) -> Iterator[Log]:
         held = whole.part(stop, len(whole)).copied()
     if held is not None and len(held):
         yield held
-
-
-def _one_after_the_other(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 HELD = ("current", "force")  # held over a sample, so that their mean acts; all others are readings

@@ -13,11 +13,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from google.protobuf.descriptor_pb2 import (
-    FieldDescriptorProto,
-    FileDescriptorProto,
-    FileDescriptorSet,
-)
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Field
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from google.protobuf.message import DecodeError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
@@ -50,12 +47,8 @@ def file_descriptor_set(message: str, numbers: Mapping[str, int]) -> bytes:
     file = FileDescriptorProto(name=f"{package}/{name}.proto", package=package, syntax="proto3")
     descriptor = file.message_type.add(name=name)
     for field, number in numbers.items():
-        descriptor.field.add(
-            name=field,
-            number=number,
-            type=FieldDescriptorProto.TYPE_DOUBLE,
-            label=FieldDescriptorProto.LABEL_OPTIONAL,
-        )
+        kind, label = Field.TYPE_DOUBLE, Field.LABEL_OPTIONAL
+        descriptor.field.add(name=field, number=number, type=kind, label=label)
     return FileDescriptorSet(file=[file]).SerializeToString(deterministic=True)
 
 
@@ -75,18 +68,18 @@ def field_numbers(channel: Channel, schema: Schema | None) -> dict[str, int]:
     except DecodeError as error:
         raise InputError(f"the protobuf schema {schema.name!r} cannot be used") from error
     found = [m for f in files for m in f.message_type if f"{f.package}.{m.name}" == schema.name]
-    numbers = {f.name: f.number for f in found[0].field if _is_double(f)} if found else {}
+    numbers = {
+        f.name: f.number
+        for message in found[:1]
+        for f in message.field
+        if f.type == Field.TYPE_DOUBLE and f.name.isidentifier() and f.number > 0
+    }
     if not found or len(numbers) != len(found[0].field):
         raise InputError(
             f"the protobuf schema {schema.name!r} is not of doubles alone; convert the log with: "
             "twin import"
         )
     return numbers
-
-
-def _is_double(field: FieldDescriptorProto) -> bool:
-    is_one = field.type == FieldDescriptorProto.TYPE_DOUBLE
-    return is_one and field.name.isidentifier() and field.number > 0
 
 
 def tag(number: int) -> bytes:

@@ -75,46 +75,35 @@ class Outline:
             planned.append(Planned(schema, channel, MessageLayout(number, signals.numbers)))
         return cls(tuple(planned), sample_rate, metadata, attachments)
 
-    @property
-    def row_bytes(self) -> int:
-        """Size of one message of every topic."""
-        return sum(topic.layout.dtype.itemsize for topic in self.topics)
-
 
 def outline_of(log: Log) -> Outline:
     """The file of a log; raises InputError for one that could not be read back."""
     _check_log(log)
+    rate, axes = repr(float(log.sample_rate)), ",".join(log.axes)
+    own = {"schema_version": SCHEMA_VERSION, "sample_rate_hz": rate, "axes": axes}
     given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
-    metadata = {
-        **given,
-        "schema_version": SCHEMA_VERSION,
-        "sample_rate_hz": repr(float(log.sample_rate)),
-        "axes": ",".join(log.axes),
-    }
-    return Outline.of(signals_of(log), log.sample_rate, metadata, log.attachments)
+    return Outline.of(signals_of(log), log.sample_rate, {**given, **own}, log.attachments)
 
 
 def signals_of(log: Log) -> Iterator[Signals]:
     """The topics of a log, or of a part of one; raises InputError where an axis lacks anything."""
+    rate = {"sample_rate_hz": repr(float(log.sample_rate))}
     for name, axis in log.axes.items():
         topic = AXIS_PREFIX + name
         with at(topic):
             _check_axis(axis)
             units = complete_units(axis.units)
         numbers = {field: n for field, n in FIELD_NUMBERS.items() if field in axis.columns}
-        metadata = {**_common(name, log), **{f"unit.{field}": units[field] for field in numbers}}
+        known = {f"unit.{field}": units[field] for field in numbers}
+        metadata = {"axis": name, **rate, **known}
         if axis.force_constant is not None:
             metadata["force_constant"] = repr(float(axis.force_constant))
         yield Signals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
     for name, columns in log.truth.items():
         units = complete_units(log.axes[name].units) if name in log.axes else {}
         known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
-        metadata = {**_common(name, log), **known}
+        metadata = {"axis": name, **rate, **known}
         yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
-
-
-def _common(axis: str, log: Log) -> dict[str, str]:
-    return {"axis": axis, "sample_rate_hz": repr(float(log.sample_rate))}
 
 
 def _check_log(log: Log) -> None:

@@ -71,29 +71,23 @@ class Series:
         first = self._first_sequence + self.count
         require_even(self.topic, block, first, self.start, self.count)
         size = len(block.log_time)
-        self._reserve(self.held + size)
-        for name, column in self._columns.items():
-            column[self.held : self.held + size] = block.columns[name]
-            require_finite(self.topic, block, name, self.count)
-        self.count += size
-        self.held += size
-
-    def taken(self) -> dict[str, Array]:
-        """The samples that are held, of every field; from here on only new ones are."""
-        columns = self._columns
-        for name, column in columns.items():
-            columns[name] = column if len(column) == self.held else column[: self.held].copy()
-        self._columns, self.held = {}, 0
-        return columns
-
-    def _reserve(self, need: int) -> None:
+        need = self.held + size
         if not self._columns:
             self._columns = {name: np.empty(max(need, self._capacity)) for name in self._fields}
         for name, column in self._columns.items():
             if need > len(column):
-                grown = np.empty(max(need, 2 * len(column)))
-                grown[: self.held] = column[: self.held]
-                self._columns[name] = grown
+                self._columns[name] = np.empty(max(need, 2 * len(column)))
+                self._columns[name][: self.held] = column[: self.held]
+            self._columns[name][self.held : need] = block.columns[name]
+            require_finite(self.topic, block, name, self.count)
+        self.count += size
+        self.held = need
+
+    def taken(self) -> dict[str, Array]:
+        """The samples that are held, of every field; from here on only new ones are."""
+        columns, held = self._columns, self.held
+        self._columns, self.held = {}, 0
+        return {n: c if len(c) == held else c[:held].copy() for n, c in columns.items()}
 
 
 def require_even(topic: Topic, block: Block, sequence: int, start: int, count: int) -> None:
@@ -122,22 +116,14 @@ def require_even(topic: Topic, block: Block, sequence: int, start: int, count: i
     off = np.abs(elapsed - times) > ROUNDING
     if off.any():
         i = int(np.argmax(off))
-        before = int(elapsed[i - 1]) if i else times[0] - 1e9 / rate
-        raise _misplaced(topic, count + i, start + before, start + int(elapsed[i]))
-
-
-def _misplaced(topic: Topic, sample: int, before: float, time: float) -> InputError:
-    """The error for a sample whose time (ns) is not a period behind that of the one before."""
-    rate = topic.sample_rate
-    if time <= before:
-        fault = "time does not increase"
-    else:
-        fault = "gap" if time - before > 1.5e9 / rate else "uneven time"
-    return InputError(
-        f"{topic.name}: {fault}: {seconds(before)} is followed by {seconds(time)} at sample "
-        f"{sample}, expected a sample every {1.0 / rate:.9g} s ({rate:.9g} Hz); keep the longest "
-        "even part with: twin recover, or convert the log with: twin import"
-    )
+        before, now = (int(elapsed[i - 1]) if i else times[0] - 1e9 / rate), int(elapsed[i])
+        fault = "gap" if now - before > 1.5e9 / rate else "uneven time"
+        raise InputError(
+            f"{name}: {fault if now > before else 'time does not increase'}: "
+            f"{seconds(start + before)} is followed by {seconds(start + now)} at sample "
+            f"{count + i}, expected a sample every {1.0 / rate:.9g} s ({rate:.9g} Hz); keep the "
+            "longest even part with: twin recover, or convert the log with: twin import"
+        )
 
 
 def require_finite(topic: Topic, block: Block, name: str, count: int) -> None:

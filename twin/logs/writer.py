@@ -15,22 +15,9 @@ from typing import BinaryIO, TypeVar
 
 import numpy as np
 import zstandard
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Statistics,
-    SummaryOffset,
-)
 
 from twin.errors import at
 from twin.files import atomic_writer, recording
@@ -104,9 +91,9 @@ def write_topics(
     rate = {"sample_rate_hz": repr(float(sample_rate))}
 
     def series(log: Log) -> Iterator[Signals]:
-        for topic, columns in ((topic, axis.columns) for topic, axis in log.axes.items()):
-            known = {f"unit.{c}": u for c in columns if (u := units.get(f"{topic}/{c}"))}
-            yield Signals(topic, SERIES, columns, numbered(columns), {**rate, **known})
+        for topic, axis in log.axes.items():
+            known = {f"unit.{c}": u for c in axis.columns if (u := units.get(f"{topic}/{c}"))}
+            yield Signals(topic, SERIES, axis.columns, numbered(axis.columns), {**rate, **known})
 
     log = Log(sample_rate, {topic: AxisLog(columns) for topic, columns in topics.items()})
     outline = Outline.of(series(log), sample_rate, {"source": "comparison"}, {})
@@ -116,6 +103,7 @@ def write_topics(
 
 Topics = Callable[[Log], Iterable[Signals]]
 """The topics of a part of a log, always the same ones in the same order."""
+_Stretch = tuple[Planned, int, Mapping[str, Array]]  # a topic, the number of its first sample
 
 
 def _written(
@@ -131,9 +119,9 @@ def _written(
     writer.add_metadata(METADATA_NAME, {**outline.metadata, **proof})
     for name, data in outline.attachments.items():
         writer.add_attachment(name, data)
-    most = max(1, chunk_bytes // outline.row_bytes)
+    most = max(1, chunk_bytes // sum(topic.layout.dtype.itemsize for topic in outline.topics))
 
-    def chunk(stretch: tuple[Planned, int, Mapping[str, Array]]) -> tuple[int, Chunk, np.ndarray]:
+    def chunk(stretch: _Stretch) -> tuple[int, records.Chunk, np.ndarray]:
         return stretch[0].channel.id, *_packed(*stretch, outline.sample_rate)
 
     for packed in _ordered(chunk, _stretches(outline, topics_of, parts, most)):
@@ -143,7 +131,7 @@ def _written(
 
 def _stretches(
     outline: Outline, topics_of: Topics, parts: Iterable[Log], most: int
-) -> Iterator[tuple[Planned, int, Mapping[str, Array]]]:
+) -> Iterator[_Stretch]:
     """Every topic of each ``most`` samples, with the number of the first; raises InputError.
 
     The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
@@ -170,11 +158,8 @@ def _sound(outline: Outline, topics_of: Topics, parts: Iterable[Log]) -> Iterato
 
 def _packed(
     topic: Planned, first: int, columns: Mapping[str, Array], sample_rate: float
-) -> tuple[Chunk, np.ndarray]:
-    """The chunk of a topic's samples from number ``first`` on, and its index, entries (n,).
-
-    It takes most of the time of writing, and may run on any thread.
-    """
+) -> tuple[records.Chunk, np.ndarray]:
+    """The chunk of a topic's samples from number ``first`` on, and its index, entries (n,)."""
     head, layout = encoded([topic.schema, topic.channel]), topic.layout
     times = sample_times(first, len(next(iter(columns.values()))), sample_rate)
     size = layout.dtype.itemsize
@@ -186,7 +171,7 @@ def _packed(
     messages[".log_time"] = messages[".publish_time"] = times
     for name, column in columns.items():
         messages[name] = column
-    chunk = Chunk(
+    chunk = records.Chunk(
         compression="zstd",
         data=zstandard.ZstdCompressor(compression_params=_COMPRESSION).compress(buffer.data),
         message_start_time=int(times[0]),
@@ -212,10 +197,10 @@ def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
             yield pending.popleft().result()
 
 
-def encoded(records: Iterable[McapRecord]) -> bytes:
+def encoded(of: Iterable[records.McapRecord]) -> bytes:
     """Records as bytes, one after the other."""
     builder = RecordBuilder()
-    for record in records:
+    for record in of:
         record.write(builder)
     return builder.end()
 
@@ -225,35 +210,34 @@ class McapWriter:
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._offset = 0
-        self._crc = 0
-        self._metadata: list[MetadataIndex] = []
-        self._attachments: list[AttachmentIndex] = []
-        self._chunks: list[ChunkIndex] = []
+        self._offset = self._crc = 0
+        self._metadata: list[records.MetadataIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._chunks: list[records.ChunkIndex] = []
         self._counts: defaultdict[int, int] = defaultdict(int)
         self._write(MAGIC)
-        self._write(encoded([Header(profile="", library=f"proton-twin {software_version()}")]))
+        self._record(records.Header(profile="", library=f"proton-twin {software_version()}"))
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
         """Write a metadata record."""
-        offset, length = self._write(encoded([Metadata(name, dict(metadata))]))
-        self._metadata.append(MetadataIndex(offset, length, name))
+        place = self._record(records.Metadata(name, dict(metadata)))
+        self._metadata.append(records.MetadataIndex(*place, name))
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment; its times are 0 so that the same log gives the same bytes."""
-        media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
-        offset, length = self._write(encoded([Attachment(0, 0, name, media_type, data)]))
-        self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
+        kind = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
+        place = self._record(records.Attachment(0, 0, name, kind, data))
+        self._attachments.append(records.AttachmentIndex(*place, 0, 0, len(data), name, kind))
 
-    def add_chunk(self, channel: int, chunk: Chunk, index: np.ndarray) -> None:
+    def add_chunk(self, channel: int, chunk: records.Chunk, index: np.ndarray) -> None:
         """Write a chunk of messages of a channel, and their index."""
-        start, length = self._write(encoded([chunk]))
+        start, length = self._record(chunk)
         # mcap.records.MessageIndex takes a list of tuples, which costs more than all the rest
         head = _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + index.nbytes, channel, index.nbytes)
         index_start, index_length = self._write(head + index.tobytes())
         self._counts[channel] += len(index)
         self._chunks.append(
-            ChunkIndex(
+            records.ChunkIndex(
                 chunk_length=length,
                 chunk_start_offset=start,
                 compression=chunk.compression,
@@ -268,38 +252,39 @@ class McapWriter:
 
     def finish(self, topics: Sequence[Planned]) -> int:
         """Close the data section, write summary, footer and magic; the samples of each topic."""
-        self._write(encoded([DataEnd(self._crc)]))
+        self._record(records.DataEnd(self._crc))
         start, self._crc = self._offset, 0
         schemas = list({topic.schema.id: topic.schema for topic in topics}.values())
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, schemas),
-            (Opcode.CHANNEL, [topic.channel for topic in topics]),
-            (Opcode.STATISTICS, [self._statistics(len(schemas), len(topics))]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
-        ]
-        places = [(opcode, *self._write(encoded(group))) for opcode, group in groups if group]
-        offsets_start = self._offset
-        self._write(encoded(SummaryOffset(*place) for place in places))
-        # the checksum of the summary covers the footer up to the checksum itself
-        unchecked = encoded([Footer(start, offsets_start, 0)])[:-4]
-        self._write(unchecked)
-        self._write(self._crc.to_bytes(4, "little") + MAGIC)
-        return self._counts[topics[0].channel.id]
-
-    def _statistics(self, schemas: int, channels: int) -> Statistics:
-        return Statistics(
+        statistics = records.Statistics(
             attachment_count=len(self._attachments),
-            channel_count=channels,
+            channel_count=len(topics),
             channel_message_counts=dict(self._counts),
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
             message_end_time=self._chunks[-1].message_end_time,
             message_start_time=self._chunks[0].message_start_time,
             metadata_count=len(self._metadata),
-            schema_count=schemas,
+            schema_count=len(schemas),
         )
+        groups: list[tuple[Opcode, Sequence[records.McapRecord]]] = [
+            (Opcode.SCHEMA, schemas),
+            (Opcode.CHANNEL, [topic.channel for topic in topics]),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
+        ]
+        places = [(opcode, *self._write(encoded(group))) for opcode, group in groups if group]
+        offsets_start = self._offset
+        self._write(encoded(records.SummaryOffset(*place) for place in places))
+        # the checksum of the summary covers the footer up to the checksum itself
+        unchecked = encoded([records.Footer(start, offsets_start, 0)])[:-4]
+        self._write(unchecked)
+        self._write(self._crc.to_bytes(4, "little") + MAGIC)
+        return self._counts[topics[0].channel.id]
+
+    def _record(self, record: records.McapRecord) -> tuple[int, int]:
+        return self._write(encoded([record]))
 
     def _write(self, data: bytes) -> tuple[int, int]:
         """Write bytes; returns where they begin and how many they are."""
