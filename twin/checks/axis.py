@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks import limits
-from twin.checks.explain import Dynamics, Lag, Smoother, Trend, find_lag, find_trend, fit_dynamics
+from twin.checks.explain import Dynamics, Smoother, Trend, find_lag, find_trend, fit_dynamics
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, usual_size, white_noise
@@ -64,11 +64,6 @@ class Axis:
         return held_samples(self.log.position)
 
     @cached_property
-    def force_held(self) -> int:
-        """The same of the command."""
-        return held_samples(self.log.force)
-
-    @cached_property
     def force_noise(self) -> float:
         """White part of the command, N rms."""
         return white_noise(self.log.force)
@@ -111,11 +106,6 @@ class Axis:
         return bool(moving * self.smoother.block > limits.LEAST_MOTION)
 
     @cached_property
-    def moves_often(self) -> bool:
-        """Whether a tenth of the log or more has motion beyond the noise of the encoder."""
-        return float(np.quantile(np.abs(self.velocity), 0.9)) > self.still
-
-    @cached_property
     def possible_jump(self) -> float:
         """Largest second difference of the position, in m, that motion and noise explain."""
         usual = float(np.quantile(np.abs(self.acceleration), 0.99))
@@ -150,18 +140,21 @@ class Axis:
         return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
 
     @cached_property
-    def lag(self) -> Lag:
-        """Lag of the command behind the motion that it causes.
+    def lag(self) -> float:
+        """Lag of the command behind the motion that it causes, s; 0 where none is clear.
 
-        Not clear where friction with a memory explains it: what lags by a distance and not by a
-        time is none.
+        Nor where friction with a memory explains it: what lags by a distance and not by a time is
+        none.
         """
-        found = find_lag(self.force, self.regressors, self.kept, self.smoother.block)
-        if not found.clear:
-            return found
-        beside = find_lag(self.force, self.remembering, self.kept, self.smoother.block)
-        same = abs(beside.seconds - found.seconds) < limits.SAME_LAG * abs(found.seconds)
-        return found if beside.clear and same else Lag(0.0, False)
+        found = self.lag_of(self.force, self.regressors)
+        beside = self.lag_of(self.force, self.remembering) if found else 0.0
+        same = abs(beside - found) < limits.SAME_LAG * abs(found)
+        return found if beside and same else 0.0
+
+    def lag_of(self, signal: Array, explained_by: Array) -> float:
+        """Lag (s) of a signal (m,) behind its regressors (m, k); 0 where that is not clear."""
+        found = find_lag(signal, explained_by, self.kept, self.smoother.block)
+        return found.seconds if found.clear else 0.0
 
     def trend(self, regressors: Array) -> Trend | None:
         """The same in each part of the log, beside some regressors of the command."""
@@ -170,7 +163,7 @@ class Axis:
     @cached_property
     def dynamics(self) -> Dynamics:
         """The command explained by the motion, with the lag between them removed."""
-        shift = round(self.lag.seconds / self.smoother.block) if self.lag.clear else 0
+        shift = round(self.lag / self.smoother.block)
         span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
         force = self.force[span.start + shift : span.stop + shift]
         return fit_dynamics(force, self.regressors[span], self.kept[span], span.start)

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.checks import limits
 from twin.checks.axis import Axis
-from twin.checks.explain import Trend, find_lag, fit_dynamics
+from twin.checks.explain import Trend, fit_dynamics
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
@@ -24,7 +24,7 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
         return
     allowed = max(limits.ALLOWED, limits.ALLOWED_SAMPLES / axis.sample_rate)
     columns = axis.log.columns
-    force = axis.lag.seconds if axis.lag.clear else 0.0
+    force = axis.lag
     if abs(force) > allowed:
         dead_time = -limits.PHYSICAL <= force < 0.0
         what, remedy = _lagging(axis, "the force", force, CAUSED, "force", "position")
@@ -73,17 +73,13 @@ def _is_steady(axis: Axis, trend: Trend | None) -> bool:
     """Whether a lag is more than its error and than what is usual, and may be a drive's."""
     if trend is None:
         return False
-    least = max(
-        limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY, limits.SURE_LAG * trend.error
-    )
-    return least < abs(trend.seconds) < limits.PHYSICAL
+    least = max(limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY)
+    return max(least, limits.SURE_LAG * trend.error) < abs(trend.seconds) < limits.PHYSICAL
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:
     """Seconds by which a signal trails the one it should equal; 0 where that is not clear."""
-    regressors = np.column_stack([other, np.ones_like(other)])
-    lag = find_lag(signal, regressors, axis.kept, axis.smoother.block)
-    return lag.seconds if lag.clear else 0.0
+    return axis.lag_of(signal, np.column_stack([other, np.ones_like(other)]))
 
 
 def _lagging(
@@ -110,10 +106,9 @@ _SLIPS: Mapping[float, str] = {
 
 @dataclass(frozen=True)
 class _Pair:
-    """A signal and the one that states the same; allowed: their ratio, from and to.
+    """A signal and the one that states the same, their ratio within ``allowed``.
 
-    follows: whether the one states where the other should be, and not where it is. zero: whether 0
-    is the same on both sides, as of speeds and not of positions.
+    follows: whether the other is a setpoint. zero: whether 0 is the same on both sides.
     """
 
     name: str
@@ -153,12 +148,11 @@ def check_units(axis: Axis) -> Iterator[Finding]:
 def _pairs(axis: Axis) -> Iterator[_Pair]:
     columns, smoother = axis.log.columns, axis.smoother
     setpoint = columns.get("setpoint_position")
+    rates = {"velocity": ("position", axis.velocity)}
     if setpoint is not None:
         goal = smoother.position(setpoint)
         yield _Pair("position", smoother.position(columns["position"]), "setpoint_position", goal,
                     limits.FOLLOWS, follows=True)  # fmt: skip
-    rates = {"velocity": ("position", axis.velocity)}
-    if setpoint is not None:
         rates["setpoint_velocity"] = ("setpoint_position", smoother.velocity(setpoint))
     for name, (of, rate) in rates.items():
         if name in columns:
@@ -177,11 +171,8 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     one, other = pair.signal, pair.other
     if not pair.zero:
         one, other = one - one.mean(), other - other.mean()
-    power = float(other @ other)
-    if power == 0.0:
-        return
-    product = float(one @ other)
-    if abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
+    power, product = float(other @ other), float(one @ other)
+    if power == 0.0 or abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
         return
     ratio = product / power
     if pair.allowed[0] <= ratio <= pair.allowed[1]:
@@ -226,8 +217,8 @@ def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
 
 def _explained_by(one: Axis, axes: Sequence[Axis]) -> Axis | None:
     """The other axis whose motion leaves least of this force by least squares, if any can."""
-    others = [a for a in axes if a is not one and a.log.kind == one.log.kind]
-    others = [a for a in others if len(a.force) == len(one.force)]
+    alike = (a for a in axes if a is not one and a.log.kind == one.log.kind)
+    others = [a for a in alike if len(a.force) == len(one.force)]
     if len(others) < 2:
         return next(iter(others), None)
     rows = slice(None, None, -(-len(one.force) // limits.ROWS_OF_A_GLANCE))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks import limits
-from twin.checks.axis import Axis
+from twin.checks.axis import Axis, held_samples
 from twin.checks.breaks import and_more, held
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
@@ -19,7 +19,7 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     if not axis.moves:
         return
     force, unit = axis.log.force, axis.log.units["force"]
-    if count := axis.force_held:
+    if count := held_samples(force):
         yield held(axis, "the force", count)
         return
     least = limits.LARGE_SAMPLE * axis.force_size

@@ -10,7 +10,6 @@ import numpy as np
 from twin.checks import limits
 from twin.checks.axis import Axis
 from twin.checks.report import WHOLE, Fault, Finding, Severity
-from twin.signals import Array
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
 # Whoever knows it to be right takes the word away.
@@ -60,20 +59,15 @@ def _missing(axis: Axis) -> Iterator[Finding]:
 
 
 def _flat(axis: Axis) -> Iterator[Finding]:
-    columns = axis.log.columns
+    flat = {n: c[0] for n, c in axis.log.columns.items() if len(c) and np.all(c == c[0])}
     for name in ("position", "velocity", "current", "force"):
-        if not _is_flat(columns.get(name)):
+        if name not in flat:
             continue
-        what = f"{name} is {columns[name][0]:.6g} {axis.log.units[name]} throughout"
-        if name in ("position", "velocity") and _is_flat(columns.get("setpoint_position")):
+        what = f"{name} is {flat[name]:.6g} {axis.log.units[name]} throughout"
+        if name in ("position", "velocity") and "setpoint_position" in flat:
             yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
         else:
-            remedy = "check that the channel was connected and mapped"
-            yield axis.error(Fault.FLAT, what, remedy)
-
-
-def _is_flat(column: Array | None) -> bool:
-    return column is not None and len(column) > 0 and bool(np.all(column == column[0]))
+            yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
 
 
 def assumptions(map_text: str, axis: str) -> list[str]:
@@ -104,7 +98,8 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[Finding]:
 def check_excitation(axis: Axis) -> Iterator[Finding]:
     """Weak excitation and coarse position."""
     unit = axis.log.units["position"]
-    if not (axis.moves and axis.moves_often):
+    often = float(np.quantile(np.abs(axis.velocity), 0.9)) > axis.still  # a tenth of the log
+    if not (axis.moves and often):
         yield axis.warning(
             Fault.WEAK_EXCITATION,
             f"the axis hardly moves: {np.ptp(axis.log.position):.2g} {unit} in all, most of the "

@@ -185,10 +185,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
 
 
 def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """Samples (k,) of the dips, by what part of one the bottom lies behind each, and its height.
-
-    A dip lies between two samples: the parabola through three of them has its bottom there.
-    """
+    """Samples (k,) of the dips; of the parabola through each the place, in samples, and height."""
     dips = 1 + np.flatnonzero((residual[1:-1] <= residual[:-2]) & (residual[1:-1] < residual[2:]))
     below, at, above = residual[dips - 1], residual[dips], residual[dips + 1]
     bend = below - 2.0 * at + above  # above 0, as a dip is lower than the one behind it
@@ -237,8 +234,6 @@ def _period(signal: Array) -> float:
     lags = np.arange(half)
     overlap = np.sqrt((power[len(signal) - lags]) * (power[-1] - power[lags]))
     alike = total / np.maximum(overlap, np.finfo(float).tiny)
-    below = np.flatnonzero(alike < 0.0)
-    if not len(below):
-        return float("inf")
-    again = np.flatnonzero(alike[below[0] :] > limits.REPEATS)
-    return float(below[0] + again[0]) if len(again) else float("inf")
+    apart = np.logical_or.accumulate(alike < 0.0)  # from where it is another for the first time
+    again = np.flatnonzero(apart & (alike > limits.REPEATS))
+    return float(again[0]) if len(again) else float("inf")

@@ -12,7 +12,7 @@ import numpy as np
 from twin.checks import check_log
 from twin.checks.report import WHOLE, CheckReport, Fault, Finding, Severity
 from twin.logs.decode import read_parts, require_intact, samples_by_axis
-from twin.logs.log import Array, Log, in_multiples, joined, thinned
+from twin.logs.log import Log, in_multiples, joined, thinned
 
 OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
 # Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
@@ -101,14 +101,9 @@ def step_of(paths: Iterable[Path]) -> int:
 
 def _parts(path: Path, fields: Sequence[str] | None = None) -> Iterator[Log]:
     """The log in as few parts of about the same length as memory allows."""
-    return read_parts(path, _part_samples(path), fields=fields)
-
-
-def _part_samples(path: Path) -> int:
-    """Samples of such a part."""
     counts = samples_by_axis(path)
     parts = max(1, -(-sum(counts.values()) // LARGEST_PART))
-    return -(-max(counts.values(), default=1) // parts)
+    return read_parts(path, -(-max(counts.values(), default=1) // parts), fields=fields)
 
 
 def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:
@@ -173,21 +168,13 @@ def log_info(path: str | Path) -> LogInfo:
         samples += len(part)
         for axis, own in part.axes.items():
             for name, column in own.columns.items():
-                ranges[axis, name] = _wider(column, ranges.get((axis, name)))
+                low, high = ranges.get((axis, name), (np.inf, -np.inf))
+                ranges[axis, name] = min(low, float(column.min())), max(high, float(column.max()))
+    axes = {}
+    for axis, own in part.axes.items():
+        channels = tuple(Channel(n, own.units[n], *ranges[axis, n]) for n in own.columns)
+        constant = own.force_constant
+        stated = None if constant is None else (constant, own.kind("N/A"))
+        axes[axis] = AxisInfo(own.kind.kind, channels, stated)
     metadata = {name: value for name, value in part.metadata.items() if name not in OWN}
-    axes = {name: _axis(part, name, ranges) for name in part.axes}
     return LogInfo(samples, part.sample_rate, axes, metadata, together(reports))
-
-
-def _wider(column: Array, known: tuple[float, float] | None) -> tuple[float, float]:
-    low, high = float(np.min(column)), float(np.max(column))
-    return (low, high) if known is None else (min(low, known[0]), max(high, known[1]))
-
-
-def _axis(log: Log, name: str, ranges: Mapping[tuple[str, str], tuple[float, float]]) -> AxisInfo:
-    own = log.axes[name]
-    channels = tuple(Channel(n, own.units[n], *ranges[name, n]) for n in own.columns)
-    constant = own.force_constant
-    return AxisInfo(
-        own.kind.kind, channels, None if constant is None else (constant, own.kind("N/A"))
-    )
