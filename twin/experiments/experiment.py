@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import KW_ONLY, MISSING, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
@@ -51,14 +52,13 @@ class Experiment(ABC):
 
     def __post_init__(self) -> None:
         for f in fields(self):
+            value, whole = getattr(self, f.name), f.metadata.get("unit") == ""
             if "zero" in f.metadata:
-                _require(f.name, getattr(self, f.name), f.metadata["unit"], f.metadata["zero"])
-            elif f.metadata.get("unit") == "":
-                value = getattr(self, f.name)
-                if not (isinstance(value, int | np.integer) and value >= 1):
-                    raise InputError(
-                        f"{f.name} {value!r} is not allowed: give a whole number of at least 1"
-                    )
+                _require(f.name, value, f.metadata["unit"], f.metadata["zero"])
+            elif whole and not (isinstance(value, int | np.integer) and value >= 1):
+                raise InputError(
+                    f"{f.name} {value!r} is not allowed: give a whole number of at least 1"
+                )
 
     @abstractmethod
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
@@ -170,7 +170,7 @@ def _with_other(alone: AnySetpoint, driven: Driven, span: float) -> Setpoint:
             f"{cycle.duration:.3g} s, the experiment lasts {alone.duration:.3g} s; give a smaller "
             "span or a longer experiment"
         )
-    both = alone.part(0, len(alone)).copied()
+    both = deepcopy(alone.part(0, len(alone)))
     for column, added in zip(both.columns[:3], cycle.whole.columns[:3], strict=True):
         column[: count * len(cycle), index] = np.tile(added[:, index], count)
     return both

@@ -102,8 +102,7 @@ def _several(f: Field[Any]) -> bool:
 def _wanted(f: Field[Any]) -> str:
     if "unit" not in f.metadata:
         return "a name in quotes"
-    unit = f.metadata["unit"]
-    if not unit:
+    if not (unit := f.metadata["unit"]):
         return "a whole number"
     return f"a list of numbers in {unit}" if _several(f) else f"a number in {unit}"
 
@@ -149,13 +148,8 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
         stream.write((",".join(names) + "\n").encode())
         for first in range(0, len(setpoint), ROWS):
             part = setpoint.part(first, min(first + ROWS, len(setpoint)))
-            np.savetxt(stream, _table(part, first, driven), fmt="%.9g", delimiter=",")
-
-
-def _table(part: Setpoint, first: int, driven: np.ndarray) -> np.ndarray:
-    """(n, columns) of some samples, of which the first has that number."""
-    columns = [np.arange(first, first + len(part)) / part.sample_rate]
-    for i in range(part.position.shape[1]):
-        columns += [part.position[:, i], part.velocity[:, i], part.acceleration[:, i]]
-        columns += [part.force[:, i]] if i in driven else []
-    return np.column_stack(columns)
+            columns = [np.arange(first, first + len(part)) / part.sample_rate]
+            for i in range(len(model.axes)):
+                own = part.columns if i in driven else part.columns[:3]
+                columns += [column[:, i] for column in own]
+            np.savetxt(stream, np.column_stack(columns), fmt="%.9g", delimiter=",")

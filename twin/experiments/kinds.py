@@ -76,11 +76,14 @@ class Tracking(Experiment):
                     f"{axis.name}, {axis.velocity:g} {unit}: give a lower one"
                 )
         samples = round(self.duration * rate)
-        left, place = (samples - 1) / rate, np.mean(travel_box(limits), axis=0)
+        low, high = travel_box(limits)
+        left, place = (samples - 1) / rate, np.mean((low, high), axis=0)
         parts: list[Phases] = []
         while left > CLOSING_REST:
             drawn = self._drawn(limits, rng)
-            target = _within_reach(drawn, place, rng)
+            reach = CRUISE * np.array([axis.velocity for axis in drawn])
+            near, far = np.maximum(low, place - reach), np.minimum(high, place + reach)
+            target = near + (far - near) * rng.beta(0.5, 0.5, place.size)
             while (step := move(drawn, place, target)).total > left:
                 target = (place + target) / 2.0
             # At least one sample, so that the loop ends whatever is drawn.
@@ -94,23 +97,9 @@ class Tracking(Experiment):
         """Limits of a move; all axes share the draws, so that none slows down the others."""
         pace = min(1.0, 1.25 * rng.random())
         effort = 10.0 ** rng.uniform(-1.0, 0.0)
-        return [
-            replace(
-                gentle(axis, effort), velocity=self.slowest * (axis.velocity / self.slowest) ** pace
-            )
-            for axis in limits
-        ]
-
-
-def _within_reach(
-    limits: Sequence[Limits], place: FloatArray, rng: np.random.Generator
-) -> FloatArray:
-    """A place in the travel that each axis reaches in about CRUISE."""
-    low, high = travel_box(limits)
-    reach = CRUISE * np.array([axis.velocity for axis in limits])
-    low, high = np.maximum(low, place - reach), np.minimum(high, place + reach)
-    target: FloatArray = low + (high - low) * rng.beta(0.5, 0.5, place.size)
-    return target
+        speeds = (self.slowest * (axis.velocity / self.slowest) ** pace for axis in limits)
+        slower = (replace(axis, velocity=v) for axis, v in zip(limits, speeds, strict=True))
+        return [gentle(axis, effort) for axis in slower]
 
 
 @dataclass(frozen=True)
@@ -128,18 +117,16 @@ class Moves(Experiment):
         limits = machine_limits(model)
         low, high = travel_box(limits)
         places = low + (high - low) * rng.uniform(*RANDOM_ENDS, (self.count, len(limits)))
-        count, dwell = self._in_time(limits, places) if self.duration else (len(places), self.dwell)
-        return point_to_point(limits, places[:count], dwell, model.sample_rate)
-
-    def _in_time(self, limits: Sequence[Limits], places: np.ndarray) -> tuple[int, float]:
-        """How many of the places fit into the time, two at least, and the rest at each, s."""
+        if not self.duration:
+            return point_to_point(limits, places, self.dwell, model.sample_rate)
         total, count = self.dwell, 1
         for start, target in pairwise(places):
             longer = total + move(limits, start, target).total + self.dwell
-            if longer > self.duration and count > 1:
+            if longer > self.duration and count > 1:  # two places at least
                 break
             total, count = longer, count + 1
-        return count, max(self.dwell + (self.duration - total) / count, 0.0)
+        dwell = max(self.dwell + (self.duration - total) / count, 0.0)
+        return point_to_point(limits, places[:count], dwell, model.sample_rate)
 
 
 @dataclass(frozen=True)
@@ -378,18 +365,14 @@ def _begun_and_ended(spectrum: np.ndarray, samples: int, rate: float, repeats: i
     periodic = np.tile(periodic, repeats + 2)
     rises = np.polynomial.Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
     along = np.arange(samples) / samples
-    weights = np.zeros((4, periodic.shape[1]))
+    weights, out = np.zeros_like(periodic), np.zeros_like(periodic)
     weights[0] = 1.0
     for k in range(4):
         own = rises.deriv(k)(along) * (rate / samples) ** k
         weights[k, :samples] = own
         weights[k, -samples:] = (-1) ** k * own[::-1]
-    return np.array(
-        [
-            sum(math.comb(k, j) * weights[j] * periodic[k - j] for j in range(k + 1))
-            for k in range(4)
-        ]
-    )
+        out[k] = sum(math.comb(k, j) * weights[j] * periodic[k - j] for j in range(k + 1))
+    return out
 
 
 def _most(limit: Limits, slow: FloatArray, sines: FloatArray) -> float:

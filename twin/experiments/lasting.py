@@ -46,13 +46,10 @@ def missed(asked: float, lasts: float) -> str | None:
     """A sentence where an experiment does not last what was asked (both s)."""
     if abs(lasts - asked) <= ALLOWED * asked:
         return None
-    return (
-        f"the experiment lasts {lasts:.3g} s, not {asked:.3g} s as asked: its moves take that long "
-        "within the limits of the machine"
-        if lasts > asked
-        else f"the experiment lasts {lasts:.3g} s, not {asked:.3g} s as asked: it has no rests to "
-        "be filled with"
-    )
+    why = "it has no rests to be filled with"
+    if lasts > asked:
+        why = "its moves take that long within the limits of the machine"
+    return f"the experiment lasts {lasts:.3g} s, not {asked:.3g} s as asked: {why}"
 
 
 def _fitted(draft: Any, seconds: float, length: Length) -> Any:

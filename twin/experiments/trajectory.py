@@ -41,13 +41,8 @@ BLOCK = 16_384  # samples worked on at once: the temporary arrays stay in the ca
 class Limits:
     """Motion limits of the setpoint of one axis; InputError where they are none.
 
-    Attributes:
-        travel: lowest and highest position, m.
-        velocity: largest speed, m/s.
-        acceleration: largest acceleration, m/s^2.
-        jerk: largest jerk, m/s^3.
-        units: of the axis; on a rotary one lengths are angles.
-        name: of the axis.
+    travel: lowest and highest position, m. velocity, acceleration, jerk: the largest, m/s, m/s^2,
+    m/s^3. units, name: of the axis; on a rotary one lengths are angles.
     """
 
     travel: tuple[float, float]
@@ -150,12 +145,9 @@ def require_length(duration: float, sample_rate: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Phases:
-    """Phases of constant jerk, one after the other.
+    """Phases of constant jerk, one after the other, each for a duration (s, shape (n_phases,)).
 
-    Attributes:
-        duration: length of each phase, s, shape (n_phases,).
-        position, velocity, acceleration, jerk: values at the start of each phase, m, m/s, m/s^2,
-            m/s^3, shape (n_phases, n_axes).
+    The others are at the start of each phase, m, m/s, m/s^2, m/s^3, shape (n_phases, n_axes).
     """
 
     duration: FloatArray
@@ -260,12 +252,10 @@ def sample(
 
 @dataclass(frozen=True, eq=False)
 class Setpoint:
-    """Setpoint of all axes; sample k is that of t = k / sample_rate.
+    """Setpoint of all axes; sample k is that of t = k / sample_rate (Hz).
 
-    Attributes:
-        position, velocity, acceleration: m, m/s, m/s^2, shape (n, n_axes).
-        force: open-loop force to command, N, shape (n, n_axes); zero in closed loop.
-        sample_rate: Hz.
+    position, velocity, acceleration: m, m/s, m/s^2, shape (n, n_axes). force: open-loop force to
+    command, N, likewise; zero in closed loop.
     """
 
     position: FloatArray
@@ -300,20 +290,12 @@ class Setpoint:
         position, velocity, acceleration, force = (c[first:stop] for c in self.columns)
         return Setpoint(position, velocity, acceleration, force, self.sample_rate)
 
-    def copied(self) -> Setpoint:
-        """The same in arrays of its own."""
-        position, velocity, acceleration, force = (c.copy() for c in self.columns)
-        return Setpoint(position, velocity, acceleration, force, self.sample_rate)
-
 
 @dataclass(frozen=True, eq=False)
 class PlannedSetpoint:
     """A closed-loop setpoint that is sampled where it is asked for: half an hour takes no memory.
 
-    Attributes:
-        phases: the motion.
-        samples: how many.
-        sample_rate: Hz.
+    samples: how many, at sample_rate (Hz).
     """
 
     phases: Phases

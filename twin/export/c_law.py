@@ -111,19 +111,16 @@ class CLaws:
         key = function, types
         if key not in self.names:
             result = self.returns(function, types)
-            self.names[key] = name = self._name(function)
+            name = f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
+            taken = sum(other.startswith(name) for other in self.names.values())
+            name = f"{name}_{taken + 1}" if name in self.names.values() else name
+            self.names[key] = name
             text = _Function(self, function, types).text(name)  # adds first what it calls
             if isinstance(result, tuple):
                 members = " ".join(f"{t} r{i};" for i, t in enumerate(result))
                 text = f"typedef struct {{ {members} }} {name}_result;\n\n{text}"
             self.texts[key] = text
         return self.names[key]
-
-    def _name(self, function: Any) -> str:
-        file = function.__module__.rpartition(".")[2]
-        own = f"{file}_{function.__name__}"
-        taken = sum(name.startswith(own) for name in self.names.values())
-        return f"{own}_{taken + 1}" if own in self.names.values() else own
 
 
 class _Function(Typed):

@@ -46,12 +46,10 @@ class Typed:
         self.arguments = dict(zip(arguments, types, strict=True))
         self.types: dict[str, Type] = dict(self.arguments)
         self.result: Type = None
-        self.known = {**function.__globals__, **_closed_over(function)}
-        self.read = {
-            n.id
-            for n in ast.walk(self.tree)
-            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)
-        }
+        closed_over = inspect.getclosurevars(function).nonlocals
+        self.known = {**function.__globals__, **closed_over}
+        names = [n for n in ast.walk(self.tree) if isinstance(n, ast.Name)]
+        self.read = {n.id for n in names if isinstance(n.ctx, ast.Load)}
         body = self.tree.body
         self.body = body[1:] if ast.get_docstring(self.tree) else body
         self._infer()
@@ -64,18 +62,15 @@ class Typed:
                 if isinstance(node, ast.For):
                     self._widen(node.target, WHOLE)
             for node in _in_order(self.body):
-                self._infer_statement(node)
+                match node:
+                    case ast.Assign(targets=[target]):
+                        self._widen(target, self.type_of(node.value))
+                    case ast.AugAssign(target=ast.Name()):
+                        self._widen(node.target, self.type_of(of_augmented(node)))
+                    case ast.Return(value=ast.expr() as value):
+                        self.result = _wider(self.result, self.type_of(value))
             if before == (self.types, self.result):
                 return
-
-    def _infer_statement(self, node: ast.stmt) -> None:
-        match node:
-            case ast.Assign(targets=[target]):
-                self._widen(target, self.type_of(node.value))
-            case ast.AugAssign(target=ast.Name()):
-                self._widen(node.target, self.type_of(of_augmented(node)))
-            case ast.Return(value=ast.expr() as value):
-                self.result = _wider(self.result, self.type_of(value))
 
     def _widen(self, target: ast.expr, found: Type) -> None:
         match target:
@@ -182,11 +177,6 @@ def _wider(one: Type, other: Type) -> Type:
     if one in WIDTH and other in WIDTH:
         return max(one, other, key=WIDTH.index)
     raise CannotTranslate("a variable holds now a number, now something else")
-
-
-def _closed_over(function: Any) -> dict[str, Any]:
-    values = [cell.cell_contents for cell in function.__closure__ or ()]
-    return dict(zip(function.__code__.co_freevars, values, strict=True))
 
 
 def _in_order(body: list[ast.stmt]) -> Iterator[ast.stmt]:

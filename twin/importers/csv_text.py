@@ -62,18 +62,13 @@ class _Style:
     def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
         """Of the cells of ``lines``; 0 where there are fewer columns."""
         rows = [self.cells(line) for line in lines]
-        if len(rows[-1]) < columns:
-            return 0.0
-        cells = list(itertools.chain.from_iterable(rows))
-        return sum(map(self.is_number, cells)) / len(cells)
+        cells = list(itertools.chain.from_iterable(rows)) if len(rows[-1]) >= columns else []
+        return sum(map(self.is_number, cells)) / max(len(cells), 1)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """encoding, style, names of the columns, and the lines before the first row of numbers.
-
-    sample_rate (Hz) and start_ns (since 1970): where the header states them.
-    """
+    """skip: lines before the first row of numbers; sample_rate: Hz, start_ns: if stated."""
 
     encoding: str
     style: _Style

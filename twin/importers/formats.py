@@ -38,13 +38,6 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
 
 
-def _is_hdf5(path: Path) -> bool:
-    """Whether the file is HDF5, alone or behind the header of MATLAB."""
-    with open(path, "rb") as stream:
-        head = stream.read(_MATLAB_HEADER + len(_SIGNATURE))
-    return head.startswith(_SIGNATURE) or head[_MATLAB_HEADER:] == _SIGNATURE
-
-
 def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
     """Columns of an HDF5 file, ``separator`` between the parts of a name; raises InputError."""
     h5py = extra("h5py")
@@ -65,16 +58,12 @@ def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
                 size += float(dataset.size or 0) * dataset.dtype.itemsize
                 require_fits(size, path)
                 if dataset.ndim in (0, 1, 2):
-                    columns |= _split(name, np.asarray(dataset[()]), separator)
+                    values, parts = np.asarray(dataset[()]), dataset.dtype.names
+                    own = {f"{name}{separator}{part}": values[part] for part in parts or ()}
+                    for key, column in (own or {name: values}).items():
+                        columns |= split_columns(key, column)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
         return Table({name: columns[name] for name in chosen(wanted, columns)})
-
-
-def _split(name: str, values: NDArray, separator: str) -> dict[str, NDArray]:
-    if values.dtype.names is None:
-        return split_columns(name, values)
-    parts = [split_columns(f"{name}{separator}{f}", values[f]) for f in values.dtype.names]
-    return {key: column for part in parts for key, column in part.items()}
 
 
 ROWS = "data"  # what the rows of a bare list are called
@@ -163,17 +152,15 @@ _FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of
 
 def read_mat(path: Path, mapping: ImportMap) -> Table:
     """Columns of a MAT file; raises InputError."""
-    if _is_hdf5(path):
+    with open(path, "rb") as stream:
+        head = stream.read(_MATLAB_HEADER + len(_SIGNATURE))
+    if head.startswith(_SIGNATURE) or head[_MATLAB_HEADER:] == _SIGNATURE:  # of version 7.3
         return read_hdf5(path, mapping, separator=".")
     with parsing("MAT"):
         content = content_bytes(path)
     # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
-    return Table(
-        isolated(
-            _load, path, mapping.column_names(),
-            seconds=SHORTEST + content / SLOWEST, memory=SMALLEST_TABLE + COPIES * content,
-        )
-    )  # fmt: skip
+    seconds, memory = SHORTEST + content / SLOWEST, SMALLEST_TABLE + COPIES * content
+    return Table(isolated(_load, path, mapping.column_names(), seconds=seconds, memory=memory))
 
 
 def content_bytes(path: Path) -> int:

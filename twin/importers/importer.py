@@ -49,20 +49,16 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
             f"{len(paths)} files are given; several need a table [[files]] for each in the map"
         )
     with reading(paths[0]):
-        return _of_one(paths[0], mapping)
-
-
-def _of_one(path: Path, mapping: ImportMap) -> Log:
-    table, columns, facts, scalars = _read(path, mapping)
-    mapping = mapping.scaled_by(scalars)
-    facts |= _start(table, mapping, columns)
-    if mapping.resample is None or mapping.time is None:
-        return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
-    with at(f"column '{mapping.time.name}'"):
-        clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
-    even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
-    facts["resampled"] = clock.costs(mapping, columns)
-    return _log(mapping, even, mapping.resample, facts)
+        table, columns, facts, scalars = _read(paths[0], mapping)
+        mapping = mapping.scaled_by(scalars)
+        facts |= _start(table, mapping, columns)
+        if mapping.resample is None or mapping.time is None:
+            return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
+        with at(f"column '{mapping.time.name}'"):
+            clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
+        even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
+        facts["resampled"] = clock.costs(mapping, columns)
+        return _log(mapping, even, mapping.resample, facts)
 
 
 def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
@@ -167,40 +163,47 @@ def _log(
             f"delay_samples of {min(delays)} to {max(delays)} leave nothing of {count} rows; "
             "correct them in the map"
         )
+    axes = {}
+    for name, axis in mapping.axes.items():
+        signals = {}
+        for field, c in axis.columns.items():
+            rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
+            signals[field] = c.to_si(columns[c.key][rows])
+            if not np.isfinite(signals[field]).all():
+                raise InputError(
+                    f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
+                    "correct them in the map"
+                )
+        axes[name] = AxisLog(signals, axis.units, axis.force_constant)
     metadata = {"source": "import", "import_map": mapping.text, **facts}
     gears = {name: axis.gear for name, axis in mapping.axes.items() if axis.gear}
-    return Log(rate, at_joints(_axes(mapping, columns, span), gears), metadata)
+    return Log(rate, at_joints(axes, gears), metadata)
 
 
 def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
     """When the recording began by the wall clock, where the format or its times say so."""
-    if table.start_ns is not None:
-        return {"start_time_unix_ns": str(table.start_ns)}
-    if mapping.time is None:
-        return {}
-    raw = np.asarray(table.columns[mapping.time.name])
-    if raw.dtype.kind == "M" and len(raw):
-        return {"start_time_unix_ns": str(int(raw[0].astype("datetime64[ns]").astype(np.int64)))}
-    first = mapping.time.to_si(columns[mapping.time.name][:1])
-    if len(first) and is_calendar(first[0]):
-        return {"start_time_unix_ns": str(round(float(first[0]) * 1e9))}
-    return {}
+    start = table.start_ns
+    if start is None and mapping.time is not None:
+        raw = np.asarray(table.columns[mapping.time.name])
+        first = mapping.time.to_si(columns[mapping.time.name])[0]
+        if raw.dtype.kind == "M":
+            start = int(raw[0].astype("datetime64[ns]").astype(np.int64))
+        elif is_calendar(first):
+            start = round(float(first) * 1e9)
+    return {} if start is None else {"start_time_unix_ns": str(start)}
 
 
 def _format_name(path: Path, mapping: ImportMap) -> str:
-    if mapping.format is not None:
-        if mapping.format not in FORMATS:
-            raise InputError(
-                f"the map gives format = '{mapping.format}'; allowed: {', '.join(FORMATS)}"
-            )
-        return mapping.format
     by_ending = {ending: name for name, (endings, _) in FORMATS.items() for ending in endings}
-    if (found := by_ending.get(path.suffix.lower())) is not None:
-        return found
-    raise InputError(
-        f"ends in '{path.suffix}', known are {', '.join(by_ending)}; state format in the map: "
-        f"{', '.join(FORMATS)}"
-    )
+    name = mapping.format
+    if name is None and (name := by_ending.get(path.suffix.lower())) is None:
+        raise InputError(
+            f"ends in '{path.suffix}', known are {', '.join(by_ending)}; state format in the map: "
+            f"{', '.join(FORMATS)}"
+        )
+    if name not in FORMATS:
+        raise InputError(f"the map gives format = '{name}'; allowed: {', '.join(FORMATS)}")
+    return name
 
 
 def _common_length(columns: Mapping[str, Array]) -> int:
@@ -234,19 +237,3 @@ def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array])
             "correct sample_rate in the map or leave it out"
         )
     return rate
-
-
-def _axes(mapping: ImportMap, columns: Mapping[str, Array], span: range) -> dict[str, AxisLog]:
-    axes = {}
-    for name, axis in mapping.axes.items():
-        signals = {}
-        for field, c in axis.columns.items():
-            rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
-            signals[field] = c.to_si(columns[c.key][rows])
-            if not np.isfinite(signals[field]).all():
-                raise InputError(
-                    f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
-                    "correct them in the map"
-                )
-        axes[name] = AxisLog(signals, axis.units, axis.force_constant)
-    return axes

@@ -19,7 +19,7 @@ as many.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -108,12 +108,6 @@ class ColumnMap(_Column):
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused later
             return np.asarray(factor * float(self.scale) * raw + factor * self.offset)
 
-    def scaled_by(self, scalars: Mapping[str, float]) -> ColumnMap:
-        """The same with the scalar of the file that its scale names, where that is among these."""
-        if not isinstance(self.scale, str) or self.scale not in scalars:
-            return self
-        return self.model_copy(update={"scale": scalars[self.scale]})
-
 
 _SIGNAL: Any = Field(None, description='a table such as {column = "name in the file", unit = "mm"}')
 
@@ -146,17 +140,6 @@ class AxisMap(Entries):
     def units(self) -> Mapping[str, str]:
         """SI unit of every field."""
         return ROTARY_UNITS if self._has(ROTARY_UNITS) else LINEAR_UNITS
-
-    def of_file(self, number: int) -> AxisMap:
-        """The same with the columns of one of several files alone."""
-        others = {field: None for field, c in self.columns.items() if c.file != number}
-        return self.model_copy(update=others)
-
-    def scaled_by(self, scalars: Mapping[str, float]) -> AxisMap:
-        """The same with the scalars of a file in the scales that name them."""
-        return self.model_copy(
-            update={field: c.scaled_by(scalars) for field, c in self.columns.items()}
-        )
 
     def require_signals(self) -> None:
         """Find the units; raises InputError where one or a signal is missing or of another kind."""
@@ -232,20 +215,29 @@ class ImportMap(_File):
 
     def scaled_by(self, scalars: Mapping[str, float]) -> ImportMap:
         """The same with these scalars in the scales that name them."""
-        axes = {name: axis.scaled_by(scalars) for name, axis in self.axes.items()}
-        return self.model_copy(update={"axes": axes})
+
+        def scaled(c: ColumnMap) -> ColumnMap:
+            named = isinstance(c.scale, str) and c.scale in scalars
+            return c.model_copy(update={"scale": scalars[str(c.scale)]}) if named else c
+
+        return self._changed(scaled)
+
+    def _changed(self, change: Callable[[ColumnMap], ColumnMap | None], **other: Any) -> ImportMap:
+        """The same with other columns, and other entries."""
+        axes = {
+            name: axis.model_copy(update={f: change(c) for f, c in axis.columns.items()})
+            for name, axis in self.axes.items()
+        }
+        return self.model_copy(update={"axes": axes, **other})
 
     def of_file(self, number: int) -> ImportMap:
         """The map of one of several files; raises InputError where no signal is in it."""
         own = (self.files or [])[number - 1]
-        axes = {name: axis.of_file(number) for name, axis in self.axes.items()}
-        if not any(axis.columns for axis in axes.values()):
+        if all(c.file != number for c in self.columns()):
             raise InputError(f"the map has no signal with file = {number}; leave that file out")
-        return self.model_copy(
-            update={
-                "axes": axes, "files": None, "sample_rate": own.sample_rate, "time": own.time,
-                "format": own.format or self.format,
-            }
+        return self._changed(
+            lambda c: c if c.file == number else None, files=None, sample_rate=own.sample_rate,
+            time=own.time, format=own.format or self.format,
         )  # fmt: skip
 
     def require_consistent(self) -> None:

@@ -133,22 +133,18 @@ def _flat(name: str, value: Any, names: Sequence[str] = ()) -> dict[str, Any]:
             if fields.keys() == {seconds, rest}:
                 time = int(fields[seconds]) * 10**9 + int(fields[rest])
                 return {name: np.datetime64(time, "ns")}
-        lists = [v for v in fields.values() if _are_entries(v) and all(map(_is_text, v)) and len(v)]
+        lists = [v for v in fields.values() if _are_entries(v) and len(v)
+                 and all(isinstance(text, str) for text in v)]  # fmt: skip
         for key, inner in fields.items():
             out |= _flat(f"{name}.{key}", inner, lists[0] if lists else ())
     elif _are_entries(value):
         for k, entry in enumerate(value):
-            texts = [v for v in (_fields(entry) or {}).values() if _is_text(v)]
-            called = texts[0] if len(texts) == 1 else None  # such as the name of a joint
-            if len(names) == len(value):
-                called = names[k]
-            for key in (f"{name}[{k + 1}]", *((f"{name}.{called}",) if called else ())):
+            texts = [v for v in (_fields(entry) or {}).values() if isinstance(v, str)]
+            called = names[k : k + 1] if len(names) == len(value) else texts  # as that of a joint
+            keys = [f"{name}.{called[0]}"] if len(called) == 1 and called[0] else []
+            for key in (f"{name}[{k + 1}]", *keys):
                 out |= _flat(key, entry)
     return out
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
 
 
 def _are_entries(value: Any) -> bool:

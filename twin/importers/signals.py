@@ -14,6 +14,9 @@ from twin.importers.units import find_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.signals import between, rate
 
+Columns = Mapping[str, Array]
+Pair = tuple[str, str, float]
+
 _SPAN = 0.01  # s over which a rate is taken
 _RATE = 0.9  # correlation of a column with the rate of another from which it is called that
 _FORCE = 0.3  # of the variance of a command that motion explains
@@ -21,9 +24,7 @@ _FOLLOWS = 0.95  # correlation of a signal and its setpoint, at the lag of the l
 _LOOP = 0.25  # s, largest lag of a loop that is followed at all
 
 
-def rate_of_another(
-    columns: Mapping[str, Array], names: Sequence[str], step: float
-) -> tuple[str, str, float] | None:
+def rate_of_another(columns: Columns, names: Sequence[str], step: float) -> Pair | None:
     """A column, the one that is its rate, and their correlation; None where no two are so."""
     found = [
         (abs(_correlation(rates(columns[x], step), means(columns[v], step))), x, v)
@@ -46,9 +47,7 @@ class Leader:
     slope: float
 
 
-def leaders(
-    columns: Mapping[str, Array], names: Sequence[str], signal: Array, step: float
-) -> list[Leader]:
+def leaders(columns: Columns, names: Sequence[str], signal: Array, step: float) -> list[Leader]:
     """Columns that have the course of a signal (k,), as of ``means``, the likest first.
 
     At some lag of a loop. The force that moves a mass does not: it goes with the acceleration and,
@@ -78,7 +77,7 @@ def ratio_of_rates(position: Array, velocity: Array, step: float) -> float:
 
 
 def moved_by(
-    columns: Mapping[str, Array], names: Sequence[str], position: Array, step: float
+    columns: Columns, names: Sequence[str], position: Array, step: float
 ) -> tuple[str, float] | None:
     """The column that the motion explains best as a force, and the share of its variance."""
     velocity, middle = rates(position, step), means(position, step)
@@ -174,9 +173,7 @@ def named(names: Sequence[str]) -> dict[str, Signal]:
     return found
 
 
-def signals_of(
-    names: Sequence[str], columns: Mapping[str, Array], step: float
-) -> dict[str, Signal]:
+def signals_of(names: Sequence[str], columns: Columns, step: float) -> dict[str, Signal]:
     """The signals that names tell, and those that the numbers tell."""
     found = named(names)
     left = [n for n in names if n not in {signal.name for signal in found.values()}]
@@ -189,30 +186,26 @@ def signals_of(
     if "position" not in found:
         return found
     left = _with_setpoints(found, left, columns, step)
-    if not {"force", "current"} & found.keys():
-        moved = moved_by(columns, left, columns[found["position"].name], step)
-        if moved is not None:
-            why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
-            found["force"] = Signal(moved[0], unit_in(moved[0]), why)
+    known = {"force", "current"} & found.keys()
+    if not known and (moved := moved_by(columns, left, columns[found["position"].name], step)):
+        why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
+        found["force"] = Signal(moved[0], unit_in(moved[0]), why)
     return found
 
 
-def _moved(
-    columns: Mapping[str, Array], names: Sequence[str], step: float
-) -> tuple[str, str, float] | None:
+def _moved(columns: Columns, names: Sequence[str], step: float) -> Pair | None:
     """The position and its rate, and their correlation: of two pairs that go alike the later."""
     pair = rate_of_another(columns, names, step)
-    if pair is None:
-        return None
-    others = [n for n in names if n not in pair]
-    alike = leaders(columns, others, means(columns[pair[0]], step), step)
-    later = {leader.name for leader in alike if leader.ahead < 0.0}
+    others = [n for n in names if pair and n not in pair]
     other = rate_of_another(columns, others, step)
-    return other if other and other[0] in later else pair
+    if pair is None or other is None:
+        return pair
+    alike = leaders(columns, others, means(columns[pair[0]], step), step)
+    return other if other[0] in {one.name for one in alike if one.ahead < 0.0} else pair
 
 
 def _with_setpoints(
-    found: dict[str, Signal], names: Sequence[str], columns: Mapping[str, Array], step: float
+    found: dict[str, Signal], names: Sequence[str], columns: Columns, step: float
 ) -> list[str]:
     """The setpoints that the numbers tell are added; the names of what is no kind of motion."""
     position, left = found["position"], list(names)

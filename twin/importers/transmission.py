@@ -43,7 +43,11 @@ def at_joints(axes: Mapping[str, AxisLog], gears: Gears) -> dict[str, AxisLog]:
             "gear: the motors of the map do not tell all joints, as their ratios depend on each "
             "other; give each motor its own joint"
         )
-    driven = {name: _with_force(axis) for name, axis in axes.items()}
+    driven = {}
+    for name, axis in axes.items():  # the force in the place of the current: forces are added
+        columns = {f: c for f, c in axis.columns.items() if f not in FORCES}
+        columns["force"] = axis.force
+        driven[name] = replace(axis, columns=columns, force_constant=None)
     out: dict[str, dict[str, Array]] = {name: {} for name in names}
     for field in dict.fromkeys(f for axis in driven.values() for f in axis.columns):
         matrix = ratios.T if field in FORCES else np.linalg.inv(ratios)
@@ -51,12 +55,6 @@ def at_joints(axes: Mapping[str, AxisLog], gears: Gears) -> dict[str, AxisLog]:
             if field in driven[name].columns:
                 out[name][field] = _sum(field, matrix[i], driven)
     return {name: replace(driven[name], columns=columns) for name, columns in out.items()}
-
-
-def _with_force(axis: AxisLog) -> AxisLog:
-    """The axis with its force in the place of its current: forces of motors are added."""
-    columns = {f: c for f, c in axis.columns.items() if f not in FORCES}
-    return replace(axis, columns={**columns, "force": axis.force}, force_constant=None)
 
 
 def _sum(field: str, row: Array, axes: Mapping[str, AxisLog]) -> Array:

@@ -96,11 +96,8 @@ def find_unit(text: str, *allowed: str) -> Unit:
 
 
 def _size_by_library(text: str, si: str) -> float | None:
-    """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity.
-
-    Angles have no dimension there, so that anything would pass for one.
-    """
-    if "rad" in si or not _WORD.search(text):
+    """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity."""
+    if "rad" in si or not _WORD.search(text):  # angles have no dimension there: anything would do
         return None
     try:
         return float(_registry()(re.sub(r"[· ]+", "*", text)).to(si.replace(" ", "*")).magnitude)

@@ -148,26 +148,25 @@ class Extras:
         """Take metadata or an attachment from a record; raises Damaged, InputError."""
         if record.opcode == Opcode.METADATA:
             metadata = record.parsed(Metadata)
-            if metadata.name == METADATA_NAME:
-                self._take(dict(metadata.metadata), f"metadata at byte {record.offset}")
+            if metadata.name != METADATA_NAME:
+                return
+            entries = dict(metadata.metadata)
+            stated = entries.pop(CHECKSUM, None)
+            if stated not in (None, checksum(entries)):
+                raise Damaged(f"metadata at byte {record.offset}: wrong checksum")
+            version = entries.get("schema_version", SCHEMA_VERSION)
+            if version != SCHEMA_VERSION:
+                raise InputError(
+                    f"log schema version is {version!r}, this program reads {SCHEMA_VERSION!r}; "
+                    "install a newer proton-twin"
+                )
+            self.metadata, self.proved = entries, stated is not None
         elif record.opcode == Opcode.ATTACHMENT:
             attachment = record.parsed(Attachment)
             crc = int.from_bytes(record.content[-4:], "little")
             if crc not in (0, zlib.crc32(record.content[:-4])):
                 raise Damaged(f"attachment at byte {record.offset}: wrong checksum")
             self.attachments[attachment.name] = attachment.data
-
-    def _take(self, entries: dict[str, str], place: str) -> None:
-        stated = entries.pop(CHECKSUM, None)
-        if stated not in (None, checksum(entries)):
-            raise Damaged(f"{place}: wrong checksum")
-        version = entries.get("schema_version", SCHEMA_VERSION)
-        if version != SCHEMA_VERSION:
-            raise InputError(
-                f"log schema version is {version!r}, this program reads {SCHEMA_VERSION!r}; "
-                "install a newer proton-twin"
-            )
-        self.metadata, self.proved = entries, stated is not None
 
 
 def checksum(metadata: Mapping[str, str]) -> str:

@@ -153,11 +153,6 @@ class MessageLayout:
             record[f"{name}.tag"] = np.frombuffer(tag(number), self.dtype[f"{name}.tag"])
         return record
 
-    def matches(self, records: np.ndarray) -> bool:
-        """True where every record has this layout's opcode, length, channel and tags."""
-        names = [n for n in self.dtype.names or () if "." in n and n not in _VARYING]
-        return all(bool((records[name] == self.template[name]).all()) for name in names)
-
 
 def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> list[Block] | None:
     """The samples from ``offset`` on, as views: rows of one message of each channel.
@@ -172,7 +167,8 @@ def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> lis
     blocks = []
     for layout in layouts:
         records = rows[str(layout.channel)]
-        if not layout.matches(records):
+        fixed = [n for n in layout.dtype.names or () if "." in n and n not in _VARYING]
+        if not all((records[name] == layout.template[name]).all() for name in fixed):
             return None
         columns = {name: records[name] for name in layout.numbers}
         blocks.append(Block(layout.channel, records[".sequence"], records[".log_time"], columns))

@@ -78,7 +78,16 @@ class Outline:
 
 def outline_of(log: Log) -> Outline:
     """The file of a log; raises InputError for one that could not be read back."""
-    _check_log(log)
+    if not log.axes or len(log) == 0:
+        raise InputError("the log has no samples; record or import at least one")
+    if not 0.0 < log.sample_rate < math.inf:
+        raise InputError(f"sample rate is {log.sample_rate} Hz; give a number above 0")
+    for name in (*log.axes, *log.truth):
+        if not IDENTIFIER.fullmatch(name):
+            raise InputError(f"axis name {name!r}: use letters, digits and underscores, as in x")
+    for key, value in log.metadata.items():
+        if not isinstance(value, str):
+            raise InputError(f"metadata {key} is {value!r}; metadata values are text")
     rate, axes = repr(float(log.sample_rate)), ",".join(log.axes)
     own = {"schema_version": SCHEMA_VERSION, "sample_rate_hz": rate, "axes": axes}
     given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
@@ -104,19 +113,6 @@ def signals_of(log: Log) -> Iterator[Signals]:
         known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
         metadata = {"axis": name, **rate, **known}
         yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
-
-
-def _check_log(log: Log) -> None:
-    if not log.axes or len(log) == 0:
-        raise InputError("the log has no samples; record or import at least one")
-    if not 0.0 < log.sample_rate < math.inf:
-        raise InputError(f"sample rate is {log.sample_rate} Hz; give a number above 0")
-    for name in (*log.axes, *log.truth):
-        if not IDENTIFIER.fullmatch(name):
-            raise InputError(f"axis name {name!r}: use letters, digits and underscores, as in x")
-    for key, value in log.metadata.items():
-        if not isinstance(value, str):
-            raise InputError(f"metadata {key} is {value!r}; metadata values are text")
 
 
 def _check_axis(axis: AxisLog) -> None:

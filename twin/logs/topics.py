@@ -135,21 +135,19 @@ class Topics:
 
     def topic(self, channel: int) -> Topic | None:
         """Topic of a channel; None where it holds no samples."""
-        if channel not in self._topics:
-            self._topics[channel] = self._open(channel)
-        return self._topics[channel]
-
-    def _open(self, number: int) -> Topic | None:
-        channel = self.channels.get(number)
-        if channel is None:
-            raise Damaged(f"a message belongs to channel {number}, which is not defined")
-        axis = axis_of(channel.topic)
-        known = channel.topic in (AXIS_PREFIX + axis, TRUTH_PREFIX + axis)
-        if not known or not IDENTIFIER.fullmatch(axis):
-            return None
-        with at(channel.topic):
-            numbers = field_numbers(channel, self.schemas.get(channel.schema_id))
-        return Topic(channel.topic, channel.metadata, MessageLayout(number, numbers))
+        if channel in self._topics:
+            return self._topics[channel]
+        own, topic = self.channels.get(channel), None
+        if own is None:
+            raise Damaged(f"a message belongs to channel {channel}, which is not defined")
+        axis = axis_of(own.topic)
+        known = own.topic in (AXIS_PREFIX + axis, TRUTH_PREFIX + axis)
+        if known and IDENTIFIER.fullmatch(axis):
+            with at(own.topic):
+                numbers = field_numbers(own, self.schemas.get(own.schema_id))
+            topic = Topic(own.topic, own.metadata, MessageLayout(channel, numbers))
+        self._topics[channel] = topic
+        return topic
 
     def blocks(self, data: bytes) -> list[Block]:
         """Samples of a chunk by channel; raises InputError, Damaged for broken framing.
