@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.judgement import Logs
 from twin.importers import import_log, load_mapping
-from twin.importers.transmission import at_joints
+from twin.importers.importer import at_joints
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

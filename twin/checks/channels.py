@@ -85,10 +85,7 @@ def _lag(axis: Axis, signal: Array, other: Array) -> float:
 def _lagging(
     axis: Axis, name: str, lag: float, other: str, late: str, early: str
 ) -> tuple[str, str]:
-    """That a signal is so many s behind the other, and the remedy: the column which is late.
-
-    early: which one is late where it is ahead.
-    """
+    """That a signal is so many s behind the other, and the remedy for the column which is late."""
     side, column = ("behind", late) if lag > 0.0 else ("ahead of", early)
     samples = abs(lag) * axis.sample_rate
     return (

@@ -127,7 +127,6 @@ class OneAxis(Experiment):
     other: float = given("m", "span of the other axis meanwhile", 0.0, zero=True)
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
-        """See Experiment."""
         model.axis(self.axis)
         if self.effort > 1.0:
             raise InputError(f"effort = {self.effort:g}: give a part of the limit, above 0 up to 1")

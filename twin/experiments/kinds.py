@@ -65,7 +65,6 @@ class Tracking(Experiment):
     slowest: float = given("m/s", "lowest speed", 5e-4)
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
-        """See Experiment."""
         limits, rate = machine_limits(model), model.sample_rate
         require_length(self.duration, rate)
         for axis in limits:
@@ -113,7 +112,6 @@ class Moves(Experiment):
     duration: float = given("s", "length, for as many places as fit; 0: of all", 0.0, zero=True)
 
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
-        """See Experiment."""
         limits = machine_limits(model)
         low, high = travel_box(limits)
         places = low + (high - low) * rng.uniform(*RANDOM_ENDS, (self.count, len(limits)))
@@ -141,7 +139,6 @@ class Passes(OneAxis):
     dwell: float = given("s", "rest at each end", 0.1, zero=True)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         return _passes(driven, self.span, self.speed, self.dwell, self.repeats)
 
 
@@ -161,7 +158,6 @@ class Staircase(OneAxis):
     dwell: float = given("s", "rest before and after each move", 0.1, zero=True)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         parts: list[Phases] = []
         limits, own = driven.limits, driven.limits[driven.index]
         for speed in self.speeds:
@@ -187,7 +183,6 @@ class Reversals(OneAxis):
     dwell: float = given("s", "rest at each reversal", 0.1, zero=True)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         cycle = _there_and_back(driven, self.amplitude, math.inf, self.dwell)
         return _repeated(cycle, self.repeats, driven.model.sample_rate)
 
@@ -204,7 +199,6 @@ class OpenLoopSine(OneAxis):
     period: float = given("s", "of the sine", 3.0)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         rate = driven.model.sample_rate
         require_length(self.duration, rate)
         if self.period < 2.0 / rate:
@@ -233,7 +227,6 @@ class Steps(OneAxis):
     dwell: float = given("s", "rest after each step", 0.05, zero=True)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         if max(self.efforts) > 1.0:
             raise InputError(
                 f"efforts = {max(self.efforts):g}: give parts of the limit, above 0 up to 1"
@@ -258,7 +251,6 @@ class Rests(OneAxis):
     rests: tuple[float, ...] = given("s", "before each pair of moves")
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         rests = (0.5 * seconds for seconds in self.rests)
         return concatenate([_passes(driven, self.span, self.speed, half, 1) for half in rests])
 
@@ -282,7 +274,6 @@ class Sweep(OneAxis):
     dwell: float = given("s", "rest at each end", 0.05, zero=True)
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         axis, rate = driven.model.axes[self.axis], driven.model.sample_rate
         allowed, unit = self.most_force(axis), axis.units.force
         if not self.amplitude <= allowed:
@@ -330,7 +321,6 @@ class Multisine(OneAxis):
     phases: int = counted("which random phases; others are another realisation")
 
     def on(self, driven: Driven) -> AnySetpoint:
-        """See OneAxis."""
         rate, limits = driven.model.sample_rate, driven.limits
         require_length((self.repeats + 2) * self.period, rate)
         samples = round(self.period * rate)
@@ -356,10 +346,7 @@ class Multisine(OneAxis):
 
 
 def _begun_and_ended(spectrum: np.ndarray, samples: int, rate: float, repeats: int) -> FloatArray:
-    """A periodic motion that rises from rest within a period and ends within one, (4, n).
-
-    Position and its three rates; spectrum: of one period of so many samples.
-    """
+    """(4, n) periodic motion and its three rates, from rest within a period and back within one."""
     turn = 2j * np.pi * np.fft.rfftfreq(samples, 1.0 / rate)
     periodic = np.fft.irfft(spectrum * turn ** np.arange(4)[:, None], samples)
     periodic = np.tile(periodic, repeats + 2)

@@ -34,9 +34,6 @@ MOST_SAMPLES = 36_000_000  # one hour at 10 kHz, the rate of the thesis's stage
 BLOCK = 16_384  # samples worked on at once: the temporary arrays stay in the cache
 
 
-# Limits
-
-
 @dataclass(frozen=True)
 class Limits:
     """Motion limits of the setpoint of one axis; InputError where they are none.
@@ -138,9 +135,6 @@ def require_length(duration: float, sample_rate: float) -> None:
             f"duration {duration:g} s at {sample_rate:g} Hz is {samples:g} samples, allowed are "
             f"1 to {MOST_SAMPLES}: change the duration, the repeats or the sample rate"
         )
-
-
-# Moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,9 +239,6 @@ def sample(
         velocity[block] = v + t * (a + t * (j / 2.0))
         acceleration[block] = a + t * j
     return position, velocity, acceleration
-
-
-# Setpoints
 
 
 @dataclass(frozen=True, eq=False)

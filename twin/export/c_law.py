@@ -381,10 +381,7 @@ class _Function(Typed):
 
 
 def _declared_in_place(body: list[ast.stmt]) -> set[str]:
-    """Names that a statement of the outermost level gives their first value, and none reads before.
-
-    In C these can be declared there.
-    """
+    """Names that an outermost statement gives their first value, and none reads before."""
     found: set[str] = set()
     seen: set[str] = set()
     for node in body:

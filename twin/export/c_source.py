@@ -96,9 +96,6 @@ def c_source(model: MachineModel) -> CSource:
     return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))
 
 
-# --- the header -----------------------------------------------------------------------------------
-
-
 def _header(
     model: MachineModel, name: str, axes: list[AxisCode], nearly: list[Remark], lost: list[Remark]
 ) -> str:
@@ -149,9 +146,6 @@ def _signature(a: AxisCode, what: str) -> str:
 def _plain(text: str) -> str:
     """Text that cannot end a comment."""
     return text.replace("*/", "* /").replace("\\", "/")
-
-
-# --- the source -----------------------------------------------------------------------------------
 
 
 def _source(model: MachineModel, name: str, axes: list[AxisCode], laws: CLaws) -> str:

@@ -235,26 +235,25 @@ def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> 
             forces.append(np.stack([whole, its.force(own)])[:, own[1] != 0.0])
         return np.concatenate(forces, axis=1)
 
-    whole = tabled(axis)
-    total, unit = both(axis, whole), axis.units.force
+    whole, units = tabled(axis), axis.units
+    total, unit = both(axis, whole), units.force
     found, where = followed(axis), ", ".join(m.name for m in given)
-    kept = [axis.units.mass_name]
+    kept = [units.mass_name]
     remarks: dict[bool, list[Remark]] = {False: [], True: []}  # lost: whether more than half
     for effect in axis.names:
-        if effect not in found.axis.names:
-            lost = effect in found.lost
-            text = (found.lost if lost else found.approximated)[effect]
-            remarks[lost].append(Remark(name, effect, text))
-            continue
-        less = axis.without(effect)
-        own, in_tables = total - both(less, tabled(less))
-        size, left = (float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables))
-        if size == 0.0:
-            text = f"it makes no {axis.units.words('force')} on {where}, so its loss is not known"
-            remarks[False].append(Remark(name, effect, text))
-        elif left <= KEPT * size:
-            kept.append(effect)
-        else:
+        lost = effect in found.lost
+        if effect in found.axis.names:
+            less = axis.without(effect)
+            own, in_tables = total - both(less, tabled(less))
+            size, left = (float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables))
+            if left <= KEPT * size and size:
+                kept.append(effect)
+                continue
+            lost = 0.0 < HALF * size < left
             text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {where}"
-            remarks[left > HALF * size].append(Remark(name, effect, text))
+            if not size:
+                text = f"it makes no {units.words('force')} on {where}, so its loss is not known"
+        else:
+            text = (found.lost if lost else found.approximated)[effect]
+        remarks[lost].append(Remark(name, effect, text))
     return Judged(whole, tuple(kept), tuple(remarks[False]), tuple(remarks[True]))

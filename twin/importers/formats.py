@@ -78,10 +78,7 @@ def read_json(path: Path, mapping: ImportMap) -> Table:
 
 
 def _flat(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
-    """The columns in arrays, lists and tables within tables: ``prefix`` and a name for each.
-
-    A list of as many texts as a matrix beside it has columns names them.
-    """
+    """The columns in arrays, lists and tables within tables, called ``prefix`` and a name."""
     columns: dict[str, NDArray] = {}
     names: list[str] = next((v for v in content.values() if _are_all(str, v)), [])
     for key, value in content.items():

@@ -74,10 +74,7 @@ def _columns(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-    """Topic, log time in ns and message; of topics that are not wanted the first alone.
-
-    Raises Damaged where there are not as many as the file announces.
-    """
+    """Topic, log time in ns and message; of topics not wanted the first alone. Raises Damaged."""
     topics, shown = Topics(), Counter[int]()
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
     with open(path, "rb") as stream:

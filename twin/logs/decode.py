@@ -303,35 +303,29 @@ class Run:
 
     def _rate(self) -> float:
         """The rate of all topics, Hz; raises InputError where an axis lacks anything."""
-        series = self._opened()
-        names = [s.topic.axis for s in series if not s.topic.is_truth]
+        topics = self._topics.names()
+        there = f"topics in the file: {', '.join(topics) or 'none'}"
+        names = [s.topic.axis for s in self._opened() if not s.topic.is_truth]
         for wanted in self._wanted.axes or ():
             if wanted not in names:
-                raise self._has_no(wanted)
-        if not names:
-            raise self._has_no(None)
-        for one in series:
-            one.topic.require_fields()
-        return common_rate([s.topic for s in series], self._extras)
-
-    def _has_no(self, axis: str | None) -> InputError:
-        """The error for an axis without samples, None: for all of them."""
-        topics = self._topics.names()
-        if axis is not None:
-            axes = [axis_of(t) for t in topics if t.startswith(AXIS_PREFIX)]
-            return InputError(
-                f"no samples on topic {AXIS_PREFIX}{axis}; topics in the file: "
-                f"{', '.join(topics) or 'none'}; name an axis of these: {', '.join(axes) or 'none'}"
-            )
-        if any(topic.startswith("/measured/") for topic in topics):
-            return InputError(
+                axes = ", ".join(axis_of(t) for t in topics if t.startswith(AXIS_PREFIX)) or "none"
+                raise InputError(
+                    f"no samples on topic {AXIS_PREFIX}{wanted}; {there}; name an axis of these: "
+                    f"{axes}"
+                )
+        if not names and any(topic.startswith("/measured/") for topic in topics):
+            raise InputError(
                 "is a comparison for viewers (`twin compare --mcap`), not a log: its force is "
                 "averaged; give the log that was compared"
             )
-        return InputError(
-            f"no samples on a topic {AXIS_PREFIX}<name>; topics in the file: "
-            f"{', '.join(topics) or 'none'}; rename them, or convert the log with: twin import"
-        )
+        if not names:
+            raise InputError(
+                f"no samples on a topic {AXIS_PREFIX}<name>; {there}; rename them, or convert the "
+                "log with: twin import"
+            )
+        for one in self._opened():
+            one.topic.require_fields()
+        return common_rate([s.topic for s in self._opened()], self._extras)
 
 
 def common_rate(topics: Iterable[Topic], extras: Extras) -> float:

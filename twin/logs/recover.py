@@ -131,8 +131,6 @@ def _intact(path: Path) -> Iterator[Log]:
         yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
 
 
-# Chunks in the bytes of a file
-
 _HEAD = struct.Struct("<BQQQQI8sQ")  # of a chunk, up to its data
 _ZSTD = b"\x04\0\0\0zstd"
 _NAME_AT = _HEAD.size - len(_ZSTD) - 8  # of the compression, in the head
@@ -143,10 +141,7 @@ _OPCODES = frozenset(Opcode)
 
 @dataclass(frozen=True)
 class _FoundChunk:
-    """A chunk that lies in the file from ``offset`` to ``end``; size, crc: of what it holds.
-
-    length_holds: whether the length of its record says so too.
-    """
+    """A chunk in the file; size, crc: of what it holds; length_holds: whether its record's does."""
 
     offset: int
     end: int
@@ -171,10 +166,7 @@ class _FoundChunk:
 
 
 def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
-    """The chunks that can be decompressed and have no wrong checksum, in the order of the file.
-
-    Within one that is proved none is looked for.
-    """
+    """The chunks that can be decompressed and have no wrong checksum, none within a proved one."""
     budget, behind = Inflation(len(file)), 0
     for place in range(0, len(file), _WINDOW):
         data = file.part(place, place + _WINDOW + _HEAD.size)  # with all of a head that begins here
@@ -201,9 +193,6 @@ def _opened(file: FileBytes, offset: int, head: tuple, budget: Inflation) -> _Fo
             continue
         return found
     return None
-
-
-# Samples, topic by topic
 
 
 def _instant(topic: Topic, sample: int) -> str:
@@ -266,10 +255,7 @@ def _columns(
 
 
 class _Salvage:
-    """What can be had from the bytes of a damaged log; it keeps no sample, but where they are.
-
-    reason: why the log cannot be read as it is.
-    """
+    """What can be had from a log with a fault (``reason``): no samples, but where they are."""
 
     def __init__(self, file: FileBytes, reason: str, keep_unproved: bool) -> None:
         self._file = file
@@ -441,11 +427,7 @@ class _Salvage:
         return offset
 
     def _end(self, offset: int, following: _FoundChunk | None) -> int | None:
-        """Where the record at a place ends, if there is one.
-
-        One that reaches over a chunk has a damaged length, but for an attachment whose checksum
-        holds: that may be a log, with chunks of its own.
-        """
+        """Where the record at a place ends, if there is one."""
         start = offset + RECORD_HEAD.size
         head = self._file.part(offset, start)
         if len(head) < RECORD_HEAD.size:
@@ -454,6 +436,7 @@ class _Salvage:
         end = start + length
         if opcode not in _OPCODES or end > len(self._file):
             return None
+        # A chunk in it: its length is damaged, unless it is an attachment that holds a log.
         if following is not None and following.offset < end:
             content = self._file.part(start, end) if opcode == Opcode.ATTACHMENT else b""
             if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little") or not content:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain
@@ -18,14 +20,25 @@ import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
+from mcap.well_known import MessageEncoding, SchemaEncoding
 
-from twin.errors import at
+from twin.errors import InputError, at
 from twin.files import atomic_writer, recording
 from twin.logs.container import MAGIC
-from twin.logs.decode import CHECKSUM, METADATA_NAME, checksum
+from twin.logs.decode import CHECKSUM, METADATA_NAME, SCHEMA_VERSION, checksum
 from twin.logs.log import Array, AxisLog, Log, in_multiples
-from twin.logs.messages import numbered, sample_times
-from twin.logs.outline import Outline, Planned, Signals, outline_of, require_samples, signals_of
+from twin.logs.messages import (
+    AXIS_SAMPLE,
+    AXIS_TRUTH,
+    FIELD_NUMBERS,
+    MessageLayout,
+    file_descriptor_set,
+    numbered,
+    sample_times,
+)
+from twin.logs.series import seconds
+from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
+from twin.numbers import first_not_finite
 
 CHUNK_BYTES = 1 << 20  # of the samples in all chunks of a stretch, as the format recommends
 WORKERS = 2  # threads that compress; more would wait for the disk
@@ -39,9 +52,128 @@ _COMPRESSION = zstandard.ZstdCompressionParameters(
 _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length of what follows, channel, bytes of entries
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _MEDIA_TYPES = {".toml": "application/toml", ".xml": "application/xml"}
-
+_TRUTH_UNITS = ("position", "velocity")  # truth columns of these names have the axis' units
 S = TypeVar("S")
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One topic to be written: numbers gives field -> protobuf number, in the order written."""
+
+    topic: str
+    message: str
+    columns: Mapping[str, Array]
+    numbers: Mapping[str, int]
+    metadata: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One topic of a file: its schema, channel and the layout of its messages."""
+
+    schema: records.Schema
+    channel: records.Channel
+    layout: MessageLayout
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Everything of a file but the samples. sample_rate: Hz."""
+
+    topics: tuple[Planned, ...]
+    sample_rate: float
+    metadata: Mapping[str, str]
+    attachments: Mapping[str, bytes]
+
+    @classmethod
+    def of(
+        cls, topics: Iterable[Signals], sample_rate: float, metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes],
+    ) -> Outline:  # fmt: skip
+        """The file of these topics; equal schemas are written once."""
+        schemas: dict[bytes, records.Schema] = {}
+        planned = []
+        for number, signals in enumerate(topics, 1):
+            data = file_descriptor_set(signals.message, signals.numbers)
+            new = records.Schema(len(schemas) + 1, data, SchemaEncoding.Protobuf, signals.message)
+            schema = schemas.setdefault(data, new)
+            channel = records.Channel(
+                number, signals.topic, MessageEncoding.Protobuf, dict(signals.metadata), schema.id
+            )
+            planned.append(Planned(schema, channel, MessageLayout(number, signals.numbers)))
+        return cls(tuple(planned), sample_rate, metadata, attachments)
+
+
+def outline_of(log: Log) -> Outline:
+    """The file of a log; raises InputError for one that could not be read back."""
+    if not log.axes or len(log) == 0:
+        raise InputError("the log has no samples; record or import at least one")
+    if not 0.0 < log.sample_rate < math.inf:
+        raise InputError(f"sample rate is {log.sample_rate} Hz; give a number above 0")
+    for name in (*log.axes, *log.truth):
+        if not IDENTIFIER.fullmatch(name):
+            raise InputError(f"axis name {name!r}: use letters, digits and underscores, as in x")
+    for key, value in log.metadata.items():
+        if not isinstance(value, str):
+            raise InputError(f"metadata {key} is {value!r}; metadata values are text")
+    rate, axes = repr(float(log.sample_rate)), ",".join(log.axes)
+    own = {"schema_version": SCHEMA_VERSION, "sample_rate_hz": rate, "axes": axes}
+    given = {key: value for key, value in log.metadata.items() if key != CHECKSUM}
+    return Outline.of(signals_of(log), log.sample_rate, {**given, **own}, log.attachments)
+
+
+def signals_of(log: Log) -> Iterator[Signals]:
+    """The topics of a log, or of a part of one; raises InputError where an axis lacks anything."""
+    rate = {"sample_rate_hz": repr(float(log.sample_rate))}
+    for name, axis in log.axes.items():
+        topic = AXIS_PREFIX + name
+        with at(topic):
+            _check_axis(axis)
+            units = complete_units(axis.units)
+        numbers = {field: n for field, n in FIELD_NUMBERS.items() if field in axis.columns}
+        known = {f"unit.{field}": units[field] for field in numbers}
+        metadata = {"axis": name, **rate, **known}
+        if axis.force_constant is not None:
+            metadata["force_constant"] = repr(float(axis.force_constant))
+        yield Signals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
+    for name, columns in log.truth.items():
+        units = complete_units(log.axes[name].units) if name in log.axes else {}
+        known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
+        metadata = {"axis": name, **rate, **known}
+        yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
+
+
+def _check_axis(axis: AxisLog) -> None:
+    unknown = set(axis.columns) - set(FIELD_NUMBERS)
+    if unknown:
+        raise InputError(
+            f"unknown signal {', '.join(sorted(unknown))}; allowed: {', '.join(FIELD_NUMBERS)}"
+        )
+    if "position" not in axis.columns or not {"current", "force"} & set(axis.columns):
+        raise InputError("a log needs position and one of current and force; add what is missing")
+    constant = axis.force_constant
+    if constant is not None and not 0.0 < constant < math.inf:
+        raise InputError(f"force constant is {constant} {axis.kind('N/A')}; give a number above 0")
+
+
+def _require_samples(signals: Signals, count: int, sample_rate: float, first: int) -> None:
+    """Raise InputError where a column is not a number for each of the samples from ``first`` on."""
+    for name, column in signals.columns.items():
+        if not IDENTIFIER.fullmatch(name):
+            raise InputError(f"column name {name!r}: use letters, digits and underscores")
+        if np.shape(column) != (count,):
+            raise InputError(
+                f"{name} has shape {np.shape(column)}, expected ({count},): one value a sample"
+            )
+        if np.asarray(column).dtype.kind not in "fiu":
+            raise InputError(f"{name} holds {np.asarray(column).dtype} values; give real numbers")
+        if (i := first_not_finite(column)) is not None:
+            raise InputError(
+                f"{name} is {column[i]} at {seconds((first + i) * 1e9 / sample_rate)} "
+                f"(sample {first + i}); "
+                "leave out a signal that was not recorded"
+            )
 
 
 def write_log(log: Log, path: str | Path, *, chunk_bytes: int = CHUNK_BYTES) -> None:
@@ -109,11 +241,7 @@ _Stretch = tuple[Planned, int, Mapping[str, Array]]  # a topic, the number of it
 def _written(
     stream: BinaryIO, outline: Outline, topics_of: Topics, parts: Iterable[Log], chunk_bytes: int
 ) -> int:
-    """Write a whole file; returns the number of samples of each topic.
-
-    Of a stretch every topic has a chunk of its own, so that one can be read without the others.
-    Every chunk begins with its schema and channel: any one of them can be read alone.
-    """
+    """Write a whole file, whose chunks can be read alone; returns the samples of each topic."""
     writer = McapWriter(stream)
     proof = {CHECKSUM: checksum(outline.metadata)}
     writer.add_metadata(METADATA_NAME, {**outline.metadata, **proof})
@@ -132,14 +260,12 @@ def _written(
 def _stretches(
     outline: Outline, topics_of: Topics, parts: Iterable[Log], most: int
 ) -> Iterator[_Stretch]:
-    """Every topic of each ``most`` samples, with the number of the first; raises InputError.
-
-    The axes come last, so that what a killed run leaves of a stretch is seldom some axes alone.
-    """
+    """Every topic of each ``most`` samples, with the number of the first; raises InputError."""
     first = 0
     for part in in_multiples(_sound(outline, topics_of, parts), most):
         for start in range(0, len(part), most):
             signals = topics_of(part.part(start, start + most))
+            # the axes last: what a killed run leaves of a stretch is seldom some axes alone
             for topic, own in reversed(list(zip(outline.topics, signals, strict=True))):
                 yield topic, first + start, own.columns
         first += len(part)
@@ -151,7 +277,7 @@ def _sound(outline: Outline, topics_of: Topics, parts: Iterable[Log]) -> Iterato
     for part in parts:
         for signals in topics_of(part):
             with at(signals.topic):
-                require_samples(signals, len(part), outline.sample_rate, first)
+                _require_samples(signals, len(part), outline.sample_rate, first)
         yield part
         first += len(part)
 

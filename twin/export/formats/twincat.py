@@ -14,14 +14,7 @@ import numpy as np
 
 from twin.export import Exported, Exporter, Remark, axis_identifiers
 from twin.export.formats.csv import csv_text
-from twin.export.tables import (
-    ENTRIES,
-    AxisTables,
-    Judged,
-    exported,
-    fewest_points,
-    judged_axes,
-)
+from twin.export.tables import ENTRIES, AxisTables, Judged, exported, fewest_points, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -82,11 +75,9 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
     for p in of.periodic:
         phase = np.arange(ENTRIES) * 360.0 / ENTRIES
         unit = f"force ({units.force})" if not known else "current (A)"
-        files[f"{name}_{p.name}.csv"] = csv_text(
-            {"phase (deg)": phase, unit: p.force / (constant if known else 1.0)}
-        )
+        files[f"{name}_{p.name}.csv"] = csv_text({"phase (deg)": phase, unit: p.force / constant})
         rows = [
-            f"{k},{abs(c) / (constant if known else 1.0):.9g},{degrees(np.angle(c)):.9g}"
+            f"{k},{abs(c) / constant:.9g},{degrees(np.angle(c)):.9g}"
             for k, c in p.harmonics().items()
         ]
         head = f"harmonic (1),amplitude of the {unit},phase of the cosine (deg)"
