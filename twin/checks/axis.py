@@ -127,10 +127,7 @@ class Axis:
 
     @cached_property
     def kept(self) -> Array:
-        """(m,) 1.0 where the low-passed motion is free of impossible jumps, else 0.0.
-
-        All 1.0 where little would be left.
-        """
+        """(m,) 1.0 where the motion has no impossible jumps, else 0.0; 1.0 if little is left."""
         if not len(self.bends):
             return np.ones(len(self.velocity))
         jumps = np.zeros(len(self.log))

@@ -23,10 +23,7 @@ from twin.signals import Array
 
 @dataclass(frozen=True)
 class Break:
-    """From sample ``first`` to ``last``; size: m, or the number of samples that are missing.
-
-    step: m, by which the course is another behind it.
-    """
+    """From sample ``first`` to ``last``; size: m or missing samples; step: m, of the course."""
 
     fault: Fault
     first: int
@@ -190,10 +187,7 @@ def and_more(count: int) -> str:
 
 
 def uneven_bends(axis: Axis) -> NDArray[np.intp]:
-    """Samples where the position bends, if it does everywhere: then it is the clock.
-
-    But not by most of the travel, as a counter that wraps.
-    """
+    """Samples where the position bends, if it does everywhere: by the clock, and by no wrap."""
     bends = axis.bends
     if not len(bends) or axis.position_held:
         return bends[:0]

@@ -73,10 +73,7 @@ def check_file(path: Path) -> CheckReport:
 
 
 def read_checked(path: Path, fields: Sequence[str], every: int = 1) -> tuple[Log, CheckReport]:
-    """The fields of a log at 1/``every`` of its rate, and the findings on the whole of it.
-
-    Raises InputError.
-    """
+    """``read_measured``, and the findings on the whole log. Raises InputError."""
     reports: list[Part] = []
     parts = (part.with_fields(fields) for part in _checked(_parts(path), reports))
     return joined(_thinned(parts, every)), together(reports)

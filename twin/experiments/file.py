@@ -80,19 +80,15 @@ def parse_experiment(table: Mapping[str, Any]) -> Experiment:
     for key, value in given.items():
         if key not in known:
             raise InputError(f"unknown entry '{key}' of kind {name}; {_known(key, known)}")
-        _require_form(known[key], value)
+        several = _several(known[key])
+        values = value if several and isinstance(value, list) else [value]
+        right = is_number if "unit" in known[key].metadata else lambda v: isinstance(v, str)
+        if several != isinstance(value, list) or not all(map(right, values)):
+            raise InputError(f"{key} = {shown(value)}: give {_wanted(known[key])}")
     for key, f in known.items():
         if f.default is MISSING and key not in given:
             raise InputError(f"{key} is missing for kind {name}; give {_wanted(f)}")
     return KINDS[name](**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
-
-
-def _require_form(f: Field[Any], value: Any) -> None:
-    several, numbers = _several(f), "unit" in f.metadata
-    values = value if several and isinstance(value, list) else [value]
-    right = is_number if numbers else lambda v: isinstance(v, str)
-    if several != isinstance(value, list) or not all(map(right, values)):
-        raise InputError(f"{f.name} = {shown(value)}: give {_wanted(f)}")
 
 
 def _several(f: Field[Any]) -> bool:

@@ -86,10 +86,7 @@ class CLaws:
     returned: dict[tuple[Any, ...], Type] = field(default_factory=dict)
 
     def law(self, law: Law) -> str:
-        """Name of the C function ``void name(const double *p, double *s, double *io)`` of a law.
-
-        Raises CannotTranslate.
-        """
+        """Name of the C function ``void name(p, s, io)`` of a law. Raises CannotTranslate."""
         return self.function(law, (P, S, IO))
 
     @property

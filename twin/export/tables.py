@@ -85,10 +85,7 @@ class AxisTables:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion on which losses are told; period: s.
-
-    setpoints: by axis (3, n), position m, velocity m/s, acceleration m/s^2.
-    """
+    """A motion on which losses are told, period s; setpoints: by axis (3, n) in m, m/s, m/s^2."""
 
     name: str
     period: float

@@ -18,11 +18,10 @@ from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
-from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
-from twin.importers.table import Table, chosen, extra, parsing, require_columns
+from twin.importers.table import Table, extra, parsing, require_columns
 from twin.logs.container import (
     IN_CHUNKS,
     Damaged,
@@ -44,33 +43,26 @@ _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish t
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of an MCAP file; raises InputError."""
     wanted = mapping.column_names()
-    with parsing("MCAP"):
-        columns = _columns(path, wanted)
-    return Table({name: columns[name] for name in chosen(wanted, columns)})
-
-
-def _columns(path: Path, wanted: Sequence[str]) -> dict[str, NDArray]:
     held: dict[str, array] = {}
     stamps: set[str] = set()
     seen: dict[str, None] = {}
-    for topic, time, decoded in _messages(path, wanted):
-        values = _flat(topic, decoded)
-        values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
-        seen.update(dict.fromkeys(values))
-        for name in wanted or values:
-            if name in values:
-                value = values[name]
-                if isinstance(value, np.datetime64):
-                    stamps.add(name)
-                    value = int(value.astype(np.int64))
-                held.setdefault(name, array("q" if name in stamps else "d")).append(value)
-            elif name in held and name.startswith(f"{topic}."):
-                raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
+    with parsing("MCAP"):
+        for topic, time, decoded in _messages(path, wanted):
+            values = _flat(topic, decoded)
+            values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
+            seen.update(dict.fromkeys(values))
+            for name in wanted or values:
+                if name in values:
+                    value = values[name]
+                    if isinstance(value, np.datetime64):
+                        stamps.add(name)
+                        value = int(value.astype(np.int64))
+                    held.setdefault(name, array("q" if name in stamps else "d")).append(value)
+                elif name in held and name.startswith(f"{topic}."):
+                    raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
     require_columns(wanted, seen)
-    return {
-        name: np.array(column, "datetime64[ns]") if name in stamps else np.array(column)
-        for name, column in held.items()
-    }
+    kinds = {name: "datetime64[ns]" if name in stamps else None for name in wanted or held}
+    return Table({name: np.array(held[name], kind) for name, kind in kinds.items()})
 
 
 def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:

@@ -24,10 +24,7 @@ SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 @dataclass(frozen=True)
 class Table:
-    """Columns as the file holds them; what the format itself states of sample rate and start.
-
-    sample_rate: Hz. start_ns: when the recording began, ns since 1970.
-    """
+    """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them."""
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
@@ -40,14 +37,13 @@ def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
     for name in wanted:
         if names.count(name) > 1:
             raise InputError(f"{names.count(name)} columns are called '{name}'; rename them")
-        if name in names:
-            continue
-        more = len(names) - _MOST_NAMES
-        tail = f" and {more} more" if more > 0 else ""
-        raise InputError(
-            f"there is no column '{name}'; {near(name, names, cutoff=0.5)}columns: "
-            f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
-        )
+        if name not in names:
+            more = len(names) - _MOST_NAMES
+            tail = f" and {more} more" if more > 0 else ""
+            raise InputError(
+                f"there is no column '{name}'; {near(name, names, cutoff=0.5)}columns: "
+                f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
+            )
 
 
 def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:

@@ -70,10 +70,7 @@ class Unit:
 
 
 def find_unit(text: str, *allowed: str) -> Unit:
-    """The unit written as ``text`` among the quantities with the SI units ``allowed``.
-
-    Raises InputError that suggests the nearest where there is none.
-    """
+    """The unit ``text`` of quantities with the SI units ``allowed``; InputError suggests one."""
     plain = text.translate(_SPELLINGS)
     if plain.endswith(("/s2", "/ms2")):
         plain = plain[:-1] + "^2"

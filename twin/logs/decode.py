@@ -179,10 +179,7 @@ def checksum(metadata: Mapping[str, str]) -> str:
 
 
 class Run:
-    """The samples of a file as they arrive, topic by topic, and its metadata and attachments.
-
-    samples: how many of a topic are held at once; None: all.
-    """
+    """The samples of a file as they arrive, of a topic so many at once (None: all), and extras."""
 
     def __init__(self, file: McapFile, wanted: Wanted, samples: int | None = None) -> None:
         self._extras = Extras()

@@ -60,10 +60,7 @@ class AxisLog:
 
     @property
     def force(self) -> Array:
-        """(n,) commanded actuator force in N: recorded, or force constant x current.
-
-        Raises InputError where neither is possible.
-        """
+        """(n,) commanded force in N: recorded, or force constant x current. Raises InputError."""
         if "force" in self.columns:
             return self.columns["force"]
         if self.force_constant is None:

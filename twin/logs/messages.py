@@ -53,10 +53,7 @@ def file_descriptor_set(message: str, numbers: Mapping[str, int]) -> bytes:
 
 
 def field_numbers(channel: Channel, schema: Schema | None) -> dict[str, int]:
-    """The doubles of a channel's messages in the order of the schema: name -> number.
-
-    Raises InputError where there is anything else in them.
-    """
+    """Name -> number of the doubles in a channel's messages; InputError for anything else."""
     if schema is None or (channel.message_encoding, schema.encoding) != ("protobuf", "protobuf"):
         raise InputError(
             f"messages are encoded as {channel.message_encoding!r} with "
@@ -113,10 +110,7 @@ def sample_times(first: int, count: int, sample_rate: float) -> NDArray[np.int64
 
 @dataclass(frozen=True)
 class Block:
-    """Consecutive samples of one channel.
-
-    sequence, log_time (ns): (n,); columns: name -> (n,).
-    """
+    """Consecutive samples of one channel: sequence, log_time (ns) and columns by name, (n,)."""
 
     channel: int
     sequence: NDArray[np.uint32]
@@ -155,10 +149,7 @@ class MessageLayout:
 
 
 def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> list[Block] | None:
-    """The samples from ``offset`` on, as views: rows of one message of each channel.
-
-    None where they are not such rows to the end.
-    """
+    """The samples from ``offset`` on, as views; None unless they are rows of every channel."""
     row = np.dtype([(str(layout.channel), layout.dtype) for layout in layouts])
     count, rest = divmod(len(data) - offset, row.itemsize)
     if rest:
