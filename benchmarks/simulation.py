@@ -82,7 +82,7 @@ def measure() -> list[Figure]:
     """Ratios of steps per second, of whole runs and of the stepping alone."""
     model = load_model("proton_xy", load_catalogue())
     setpoint = Tracking(DURATION).setpoint(model, np.random.default_rng(1))
-    n = len(setpoint.position)
+    n = len(setpoint)
     bare_model = MujocoSimulator(model, model.table()).model
     bare_data = mujoco.MjData(bare_model)
     in_mujoco = _Simulation(model, setpoint, MujocoSimulator)

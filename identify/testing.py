@@ -18,7 +18,7 @@ from identify.output.text import agree_text
 from identify.results.results import FitResult
 from identify.workflow import agree
 from twin.effects import Catalogue, load_catalogue
-from twin.export.agreement import compare_export
+from twin.export import compare_export
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.file import as_model, load_model
 from twin.model.machine import MachineModel

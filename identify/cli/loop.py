@@ -276,7 +276,7 @@ def agree(
 def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Path]) -> Said:
     from identify.output.answers.machine import ExportAgreementAnswer
     from identify.output.machine import export_agreement_text
-    from twin.export.agreement import compare_export
+    from twin.export import compare_export
 
     found = compare_export(model, path, Recordings(logs))
     answer = ExportAgreementAnswer.of(found, a=name, b=path)

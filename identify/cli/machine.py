@@ -48,8 +48,7 @@ def simulate(
     """
     from identify.output.answers.machine import LogAnswer
     from twin.experiments.file import SUFFIX, load_experiment, write_setpoints
-    from twin.experiments.lasting import missed
-    from twin.experiments.named import DURATION, Reach, find_experiment, simulate_parts
+    from twin.experiments.named import DURATION, Reach, find_experiment, missed, simulate_parts
     from twin.logs import record_log
 
     stage, _ = loaded(model, effects)

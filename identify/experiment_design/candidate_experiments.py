@@ -21,7 +21,7 @@ from twin.experiments.kinds import (
     Sweep,
     Tracking,
 )
-from twin.experiments.lasting import ALLOWED, lasting
+from twin.experiments.named import ALLOWED, lasting
 from twin.experiments.trajectory import Limits
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import LINEAR, AxisUnits

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from identify.dataset.motion import Motion
     from twin.checks import CheckReport
     from twin.checks.long import AxisInfo, LogInfo
-    from twin.export import Exported
-    from twin.export.agreement import ExportAgreement
+    from twin.export import ExportAgreement, Exported
     from twin.laws.verdict import LawReport
 
 

@@ -245,21 +245,19 @@ def _rough_command(axis: Axis) -> Array:
 
 def _contradictions(axis: Axis) -> Iterator[Finding]:
     """Where command and motion contradict each other, except at jumps of the position."""
-    if not axis.dynamics.explains:
-        return
     fit = axis.dynamics
+    if not fit.explains:
+        return
     error = np.abs(fit.residual) * axis.kept[fit.first : fit.first + len(fit.residual)]
     command = np.quantile(np.abs(axis.force - np.median(axis.force)), 0.99)
-    usual = _usual(axis, error)
+    usual, unit = _usual(axis, error), axis.log.units["force"]
     bad = np.flatnonzero(error > max(limits.UNUSUAL * usual, limits.CONTRADICTION * command))
     if len(bad):
-        unit = axis.log.units["force"]
-        yield _outliers(
-            axis,
-            axis.smoother.time(bad + fit.first),
+        what = (
             f"force and motion contradict each other by up to {error.max():.3g} {unit}, "
-            f"elsewhere by less than {usual:.2g} {unit}",
+            f"elsewhere by less than {usual:.2g} {unit}"
         )
+        yield _outliers(axis, axis.smoother.time(bad + fit.first), what)
 
 
 def _usual(axis: Axis, values: Array) -> float:

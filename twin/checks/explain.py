@@ -48,7 +48,7 @@ class Smoother:
 
     def position(self, x: Array) -> Array:
         """Position (n,) -> low-passed, in the middle of each block (m,)."""
-        edges = self._edges(x)
+        edges = x[:: self.samples]
         return self._low_pass(0.5 * (edges[1:] + edges[:-1]))
 
     def velocity(self, x: Array) -> Array:
@@ -91,11 +91,7 @@ class Smoother:
         return float(noise / self.block**2 * np.linalg.norm(kernel))
 
     def _block_velocity(self, x: Array) -> Array:
-        return between(self._edges(x), self.block)
-
-    def _edges(self, x: Array) -> Array:
-        count = (len(x) - 1) // self.samples
-        return x[: count * self.samples + 1 : self.samples]
+        return between(x[:: self.samples], self.block)
 
     def _low_pass(self, signal: Array) -> Array:
         return np.convolve(signal, self.weights, "valid")
@@ -134,14 +130,10 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dy
         error = np.abs(residual)
         use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - limits.TRIMMED))
     spread = float(np.std(force[use]))
-    inertial = float(np.std(gains[0] * scaled[use, 0]))
-    return Dynamics(
-        mass=float(gains[0] / size[0]) if size[0] > 0.0 else 0.0,
-        explains=float(np.std(residual[use])) < limits.EXPLAINED * spread,
-        inertial_share=inertial / spread if spread > 0.0 else 0.0,
-        residual=residual,
-        first=first,
-    )
+    explains = float(np.std(residual[use])) < limits.EXPLAINED * spread
+    mass = float(gains[0] / size[0]) if size[0] > 0.0 else 0.0
+    share = float(np.std(gains[0] * scaled[use, 0])) / spread if spread > 0.0 else 0.0
+    return Dynamics(mass, explains, share, residual, first)
 
 
 @dataclass(frozen=True)

@@ -170,6 +170,6 @@ def _with_other(alone: AnySetpoint, driven: Driven, span: float) -> Setpoint:
             "span or a longer experiment"
         )
     both = deepcopy(alone.part(0, len(alone)))
-    for column, added in zip(both.columns[:3], cycle.whole.columns[:3], strict=True):
+    for column, added in zip(both.columns[:3], cycle.part(0, len(cycle)).columns[:3], strict=True):
         column[: count * len(cycle), index] = np.tile(added[:, index], count)
     return both

@@ -207,7 +207,7 @@ class OpenLoopSine(OneAxis):
                 f"{2.0 / rate:g} s"
             )
         samples = round(self.duration * rate)
-        still = PlannedSetpoint(rest(driven.place, self.duration), samples, rate).whole
+        still = PlannedSetpoint(rest(driven.place, self.duration), samples, rate)
         angle = 2.0 * np.pi / self.period * (np.arange(samples) / rate)
         return _with_force(still, driven, self.amplitude * np.sin(angle))
 
@@ -291,7 +291,7 @@ class Sweep(OneAxis):
         growth, samples = math.log(self.highest / self.lowest), len(passes)
         cycles = self.lowest * passes.duration / growth
         phase = 2.0 * np.pi * (cycles * np.expm1(growth * np.arange(samples) / samples))
-        return _with_force(passes.whole, driven, self.amplitude * np.sin(phase))
+        return _with_force(passes, driven, self.amplitude * np.sin(phase))
 
     def most_force(self, axis: AxisModel) -> float:
         """Largest amplitude in N that stays within what the moves leave of the axis' limits."""
@@ -399,11 +399,11 @@ def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedS
     return whole_motion([cycle[-1], *cycle * repeats], sample_rate)
 
 
-def _with_force(setpoint: Setpoint, driven: Driven, force: FloatArray) -> Setpoint:
+def _with_force(planned: PlannedSetpoint, driven: Driven, force: FloatArray) -> Setpoint:
     """The setpoint with a force (n,), N, on the axis."""
-    columns = setpoint.force.copy()
-    columns[:, driven.index] = force
-    return replace(setpoint, force=columns)
+    setpoint = planned.part(0, len(planned))
+    setpoint.force[:, driven.index] = force
+    return setpoint
 
 
 KINDS: Mapping[str, type[Experiment]] = {

@@ -6,15 +6,17 @@ sine; tracking is the rich motion on which models are fitted and tested.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from twin.core.control import Controller
 from twin.entries import near
-from twin.errors import InputError
-from twin.experiments.experiment import Experiment, driven_units, machine_limits
+from twin.errors import CannotRun, InputError
+from twin.experiments.experiment import Experiment, OneAxis, driven_units, machine_limits
 from twin.experiments.file import format_experiment, setpoint_of
 from twin.experiments.follow import follow_parts
 from twin.experiments.kinds import (
@@ -22,17 +24,18 @@ from twin.experiments.kinds import (
     Multisine,
     OpenLoopSine,
     Passes,
+    Rests,
     Reversals,
     Staircase,
+    Steps,
     Tracking,
     kind_of,
 )
-from twin.experiments.lasting import lasting
 from twin.experiments.trajectory import Limits, require_length
 from twin.logs import Log
 from twin.logs.log import joined
 from twin.model.machine import MachineModel
-from twin.numbers import require_seed
+from twin.numbers import neat, require_seed
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
@@ -41,6 +44,72 @@ PASS_SPEED = 0.1  # m/s
 PASS_PART = 0.88  # of the travel
 DURATION = 20.0  # s
 REST = 0.1  # s between moves
+LEAST_DWELL = 0.02  # s, to which rests are shortened where the moves need the time
+MOST_HALVINGS = 10  # of the plateaus of a staircase
+ALLOWED = 0.05  # part of what was asked by which the length may be off
+
+Kind = TypeVar("Kind", bound=Experiment)
+Length = Callable[[Experiment], float]
+
+
+def lasting(draft: Kind, model: MachineModel, seconds: float) -> Kind:
+    """The experiment, filling that time (s); as it is where it cannot run, or takes longer.
+
+    Where its moves alone take longer it is as short as it can be.
+    """
+
+    def length(experiment: Experiment) -> float:
+        return experiment.setpoint(model, np.random.default_rng(0)).duration
+
+    other = draft.other if isinstance(draft, OneAxis) else 0.0
+    given: Any = draft
+    alone = replace(given, other=0.0) if other else given
+    try:
+        found = _filled(_fitted(alone, seconds, length), seconds, length)
+    except CannotRun:
+        return draft
+    return replace(found, other=other) if other else found
+
+
+def missed(asked: float, lasts: float) -> str | None:
+    """A sentence where an experiment does not last what was asked (both s)."""
+    if abs(lasts - asked) <= ALLOWED * asked:
+        return None
+    why = "it has no rests to be filled with"
+    if lasts > asked:
+        why = "its moves take that long within the limits of the machine"
+    return f"the experiment lasts {lasts:.3g} s, not {asked:.3g} s as asked: {why}"
+
+
+def _fitted(draft: Any, seconds: float, length: Length) -> Any:
+    """With as many repeats, or as long plateaus, as take no longer than that."""
+    if hasattr(draft, "repeats"):
+        once, twice = (length(replace(draft, repeats=n)) for n in (1, 2))
+        more = math.floor((seconds - once) / (twice - once) * (1.0 + 1e-9))
+        return replace(draft, repeats=1 + max(more, 0))
+    if isinstance(draft, Steps):
+        while length(draft) > seconds and len(draft.efforts) > 1:
+            draft = replace(draft, efforts=draft.efforts[:-1])
+    if isinstance(draft, Staircase):
+        for _ in range(MOST_HALVINGS):
+            if length(draft) <= seconds:
+                break
+            draft = replace(draft, longest_plateau=neat(0.5 * draft.longest_plateau))
+    return draft
+
+
+def _filled(draft: Any, seconds: float, length: Length) -> Any:
+    """With its rests longer, or shorter, by what is left of the time."""
+    now = length(draft)
+    if isinstance(draft, Rests):
+        longer = length(replace(draft, rests=tuple(2.0 * rest for rest in draft.rests))) - now
+        factor = max(1.0 + (seconds - now) / longer, 0.05)
+        return replace(draft, rests=tuple(neat(factor * rest) for rest in draft.rests))
+    if not hasattr(draft, "dwell") or hasattr(draft, "duration"):
+        return draft
+    longer = length(replace(draft, dwell=draft.dwell + 1.0)) - now  # s for each s of rest
+    dwell = draft.dwell + (seconds - now) / longer
+    return replace(draft, dwell=neat(max(dwell, min(LEAST_DWELL, draft.dwell or LEAST_DWELL))))
 
 
 @dataclass(frozen=True)

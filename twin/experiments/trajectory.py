@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -306,31 +305,6 @@ class PlannedSetpoint:
         count = min(stop, self.samples) - first
         columns = sample(self.phases, count, self.sample_rate, first)
         return Setpoint(*columns, np.zeros_like(columns[0]), self.sample_rate)
-
-    @cached_property
-    def whole(self) -> Setpoint:
-        """All its samples."""
-        return self.part(0, self.samples)
-
-    @property
-    def position(self) -> FloatArray:
-        """m, shape (n, n_axes)."""
-        return self.whole.position
-
-    @property
-    def velocity(self) -> FloatArray:
-        """m/s, shape (n, n_axes)."""
-        return self.whole.velocity
-
-    @property
-    def acceleration(self) -> FloatArray:
-        """m/s^2, shape (n, n_axes)."""
-        return self.whole.acceleration
-
-    @property
-    def force(self) -> FloatArray:
-        """N, shape (n, n_axes): zero."""
-        return self.whole.force
 
 
 AnySetpoint = Setpoint | PlannedSetpoint

@@ -103,7 +103,7 @@ def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
         given[f"simulated {EXPERIMENT}"] = planned.setpoint(model, np.random.default_rng(SEED))
     found = []
     for name, s in given.items():
-        by_axis = np.stack([s.position, s.velocity, s.acceleration]).transpose(2, 0, 1).copy()
+        by_axis = np.stack(s.part(0, len(s)).columns[:3]).transpose(2, 0, 1).copy()
         found.append(Motion(name, 1.0 / s.sample_rate, dict(zip(model.axes, by_axis, strict=True))))
     return found
 

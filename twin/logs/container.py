@@ -9,7 +9,6 @@ import zlib
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, TypeVar
@@ -95,28 +94,24 @@ class McapFile:
     def __init__(self, data: FileBytes) -> None:
         self._bytes = data
         self.size = len(data)
-        self._check_magic()
         self._summary: list[Record] = []
         self._data_end = self._read_summary()
         self.definitions = [r for r in self._summary if r.opcode in IN_CHUNKS]
         statistics = self._summarised(Opcode.STATISTICS, Statistics)
         self.counts = statistics[0].channel_message_counts if statistics else None
 
-    def _check_magic(self) -> None:
+    def _read_summary(self) -> int:
+        """Keep the records of the summary; returns where the data end."""
         if self.size == 0:
             raise Damaged("the file is empty")
         if self._bytes.part(0, len(MAGIC)) != MAGIC:
             raise InputError(
                 "not an MCAP file (wrong magic in bytes 0 to 7); convert it with: twin import"
             )
-        least, end = 2 * len(MAGIC) + _FOOTER_SIZE, self.size - len(MAGIC)
-        if self.size < least or self._bytes.part(end, self.size) != MAGIC:
-            raise Damaged(f"truncated: ends at byte {self.size} without the closing MCAP magic")
-
-    def _read_summary(self) -> int:
-        """Keep the records of the summary; returns where the data end."""
         end = self.size - len(MAGIC)
         start = end - _FOOTER_SIZE
+        if start < len(MAGIC) or self._bytes.part(end, self.size) != MAGIC:
+            raise Damaged(f"truncated: ends at byte {self.size} without the closing MCAP magic")
         record = self._record(start, end)
         if record.opcode != Opcode.FOOTER or record.end != end:
             raise Damaged(f"no footer record at byte {start}")
@@ -140,10 +135,6 @@ class McapFile:
         """The channels, as the summary lists them."""
         return self._summarised(Opcode.CHANNEL, Channel)
 
-    @cached_property
-    def _chunks(self) -> list[ChunkIndex]:
-        return self._summarised(Opcode.CHUNK_INDEX, ChunkIndex)
-
     def selected(
         self, channels: Container[int], start: float = -math.inf, stop: float = math.inf
     ) -> Iterator[Record]:
@@ -151,12 +142,13 @@ class McapFile:
 
         start, stop: ns. All records where the summary has no index of the chunks.
         """
-        first = min((c.chunk_start_offset for c in self._chunks), default=self.size)
+        chunks = self._summarised(Opcode.CHUNK_INDEX, ChunkIndex)
+        first = min((c.chunk_start_offset for c in chunks), default=self.size)
         for record in self.records():
             if record.offset >= first:
                 break
             yield record
-        for chunk in sorted(self._chunks, key=lambda c: c.message_start_time):
+        for chunk in sorted(chunks, key=lambda c: c.message_start_time):
             held = chunk.message_index_offsets  # which an index may leave out
             between = chunk.message_end_time >= start and chunk.message_start_time < stop
             if between and (not held or any(channel in channels for channel in held)):

@@ -242,20 +242,16 @@ class Run:
     def holds(self, samples: int) -> bool:
         """Whether all topics that the file announces hold so many or more, to the same time."""
         series = self._series.values()
-        return (
-            self._series.keys() == self._expected
-            and len({s.span for s in series}) == 1
-            and all(s.held >= samples for s in series)
-        )
+        whole = self._series.keys() == self._expected and len({s.span for s in series}) == 1
+        return whole and all(s.held >= samples for s in series)
 
     def require_counts(self) -> None:
         """Raise Damaged where there are not as many samples as the file announces."""
-        for channel, series in self._series.items() if self._counts is not None else ():
-            announced = (self._counts or {}).get(channel, 0)
-            if series.count != announced:
+        for channel, series in self._series.items():
+            if self._counts is not None and series.count != self._counts.get(channel, 0):
                 raise Damaged(
                     f"{series.topic.name}: {series.count} samples where the statistics announce "
-                    f"{announced}"
+                    f"{self._counts.get(channel, 0)}"
                 )
 
     def log(self) -> Log:
@@ -266,8 +262,8 @@ class Run:
                 end = one.start + (one.count - 1) * 1e9 / one.rate
                 raise InputError(
                     f"{one.topic.name} has {one.count} samples from {seconds(one.start)} to "
-                    f"{seconds(end)}, other topics differ; "
-                    "keep what they have in common with: twin recover"
+                    f"{seconds(end)}, other topics differ; keep what they have in common with: "
+                    "twin recover"
                 )
         return assembled(((s.topic, s.taken()) for s in self._opened()), rate, self._extras)
 

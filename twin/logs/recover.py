@@ -230,13 +230,10 @@ class _Stretch:
 
     def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
         """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
-        rate = self.empty(extras).sample_rate
+        rate, every = self.empty(extras).sample_rate, self.pieces.values()
         for first in self.samples[::STEP]:
             stop = min(first + STEP, self.samples.stop)
-            columns = (
-                (pieces[0].topic, _columns(pieces, first, stop, read))
-                for pieces in self.pieces.values()
-            )
+            columns = ((own[0].topic, _columns(own, first, stop, read)) for own in every)
             yield assembled(columns, rate, extras)
 
 

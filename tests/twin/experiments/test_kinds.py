@@ -27,7 +27,7 @@ from twin.experiments.kinds import (
     Tracking,
 )
 from twin.experiments.named import EXPERIMENTS, MAP_SPEEDS, find_experiment
-from twin.experiments.trajectory import AnySetpoint, Setpoint
+from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Hardware, MachineModel
 
 RATE = 2000.0
@@ -39,8 +39,9 @@ MIDDLE = (0.03, 0.02)
 SPEEDS = (0.0001, 0.001, 0.015, 0.1)
 
 
-def made(experiment: Experiment, seed: int = 0, model: MachineModel = STAGE) -> AnySetpoint:
-    return experiment.setpoint(model, np.random.default_rng(seed))
+def made(experiment: Experiment, seed: int = 0, model: MachineModel = STAGE) -> Setpoint:
+    setpoint = experiment.setpoint(model, np.random.default_rng(seed))
+    return setpoint.part(0, len(setpoint))
 
 
 # The laws of every setpoint
@@ -54,7 +55,7 @@ EVERY = (
 )  # fmt: skip
 
 
-def assert_lawful(setpoint: AnySetpoint) -> None:
+def assert_lawful(setpoint: Setpoint) -> None:
     """Limits kept, position, velocity and acceleration of one motion, at rest at both ends."""
     h = 1.0 / setpoint.sample_rate
     position, velocity = setpoint.position, setpoint.velocity
@@ -92,8 +93,7 @@ def test_every_setpoint_keeps_the_laws(experiment: Experiment) -> None:
     ],
 )
 def test_the_laws_notice_a_planted_fault(fault: Callable[[Setpoint], Setpoint]) -> None:
-    planned = made(Moves(2, dwell=0.05), 1)
-    whole = planned.part(0, len(planned))
+    whole = made(Moves(2, dwell=0.05), 1)
     assert_lawful(whole)
     with pytest.raises(AssertionError):
         assert_lawful(fault(whole))

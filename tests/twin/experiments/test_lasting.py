@@ -8,8 +8,7 @@ import pytest
 import twin
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import Moves, Passes, Rests, Staircase, Steps, Sweep
-from twin.experiments.lasting import lasting, missed
-from twin.experiments.named import EXPERIMENTS, find_experiment
+from twin.experiments.named import EXPERIMENTS, find_experiment, lasting, missed
 
 MODEL = twin.load_model("proton_xy")
 
