@@ -14,6 +14,8 @@ from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, usual_size, white_noise
 
+READINGS = ("position", "velocity", "current", "force")
+
 
 @dataclass(frozen=True, eq=False)
 class Axis:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.checks import limits
-from twin.checks.axis import Axis
+from twin.checks.axis import READINGS, Axis
 from twin.checks.explain import Trend, fit_dynamics
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
 CAUSED = "the motion that it causes"
 DEAD_TIME = ", unless the drive has that dead time"
-READINGS = ("position", "velocity", "current", "force")
 
 
 def check_timing(axis: Axis) -> Iterator[Finding]:

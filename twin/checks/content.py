@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from twin.checks import limits
-from twin.checks.axis import Axis
+from twin.checks.axis import READINGS, Axis
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
@@ -32,7 +32,13 @@ def check_content(axis: Axis) -> Iterator[Finding]:
                 "cut the log there, or leave the signal out if it was not recorded",
                 f"from {bad[0] / axis.sample_rate:.6g} s",
             )
-    yield from _flat(axis)
+    flat = {n: c[0] for n, c in axis.log.columns.items() if len(c) and np.all(c == c[0])}
+    for name in (n for n in READINGS if n in flat):
+        what = f"{name} is {flat[name]:.6g} {axis.log.units[name]} throughout"
+        if name in ("position", "velocity") and "setpoint_position" in flat:
+            yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
+        else:
+            yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
     if axis.duration < limits.SHORTEST:
         yield axis.error(
             Fault.TOO_SHORT,
@@ -56,18 +62,6 @@ def _missing(axis: Axis) -> Iterator[Finding]:
         told = ", ".join(f"{name} {length}" for name, length in lengths.items())
         what = f"the columns differ in length ({told})"
         yield axis.error(Fault.INCOMPLETE, what, "record all with one clock")
-
-
-def _flat(axis: Axis) -> Iterator[Finding]:
-    flat = {n: c[0] for n, c in axis.log.columns.items() if len(c) and np.all(c == c[0])}
-    for name in ("position", "velocity", "current", "force"):
-        if name not in flat:
-            continue
-        what = f"{name} is {flat[name]:.6g} {axis.log.units[name]} throughout"
-        if name in ("position", "velocity") and "setpoint_position" in flat:
-            yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
-        else:
-            yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
 
 
 def assumptions(map_text: str, axis: str) -> list[str]:
@@ -118,7 +112,17 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
             f"{mass} cannot be identified; with it go all forces in proportion to acceleration",
             f"add faster changes of speed, or give the {mass} and hold it (fixed)",
         )
-    yield from _coarse(axis)
+    noise = axis.smoother.acceleration_noise(axis.position_noise)
+    rms = float(np.sqrt(np.mean(axis.acceleration**2)))
+    rounded = axis.position_white < limits.ROUNDING * axis.position_step
+    if noise >= (limits.ROUNDED if rounded else limits.COARSE) * rms:
+        yield axis.warning(
+            Fault.COARSE_POSITION,
+            f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
+            f"{axis.position_step:.2g} {unit}), which over {axis.smoother.length * 1e3:.2g} ms "
+            f"makes {noise:.2g} of the {rms:.2g} {axis.log.units['setpoint_acceleration']} seen",
+            "use a finer encoder or a livelier motion",
+        )
 
 
 def _directions(axis: Axis) -> Iterator[Finding]:
@@ -142,19 +146,3 @@ def _directions(axis: Axis) -> Iterator[Finding]:
             "Coulomb and the viscous friction cannot be told apart",
             "add other speeds",
         )
-
-
-def _coarse(axis: Axis) -> Iterator[Finding]:
-    noise = axis.smoother.acceleration_noise(axis.position_noise)
-    rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    rounded = axis.position_white < limits.ROUNDING * axis.position_step
-    if noise < (limits.ROUNDED if rounded else limits.COARSE) * rms:
-        return
-    unit = axis.log.units["position"]
-    yield axis.warning(
-        Fault.COARSE_POSITION,
-        f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
-        f"{axis.position_step:.2g} {unit}), which over {axis.smoother.length * 1e3:.2g} ms makes "
-        f"{noise:.2g} of the {rms:.2g} {axis.log.units['setpoint_acceleration']} seen",
-        "use a finer encoder or a livelier motion",
-    )

@@ -24,7 +24,7 @@ from twin.experiments.trajectory import (
     travel_box,
 )
 from twin.model.machine import MachineModel
-from twin.model.units import AxisUnits, rotary_unit
+from twin.model.units import rotary_unit
 
 TURN_REST = 0.1  # s of rest of the other axis at each end, as of moves by default
 
@@ -76,12 +76,6 @@ def _require(name: str, value: Any, unit: str, zero: bool) -> None:
             raise InputError(f"{name} = {v} {unit}: is not allowed; give {allowed} {unit}{also}")
     if not values:
         raise InputError(f"{name}: is empty; give at least one number in {unit}")
-
-
-def driven_units(experiment: Experiment, model: MachineModel) -> AxisUnits:
-    """Units of the axis that an experiment drives, of the first where it drives all."""
-    name = experiment.axis if isinstance(experiment, OneAxis) else next(iter(model.axes))
-    return model.axis(name).units
 
 
 def machine_limits(model: MachineModel) -> list[Limits]:

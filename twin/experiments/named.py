@@ -16,7 +16,7 @@ import numpy as np
 from twin.core.control import Controller
 from twin.entries import near
 from twin.errors import CannotRun, InputError
-from twin.experiments.experiment import Experiment, OneAxis, driven_units, machine_limits
+from twin.experiments.experiment import Experiment, OneAxis, machine_limits
 from twin.experiments.file import format_experiment, setpoint_of
 from twin.experiments.follow import follow_parts
 from twin.experiments.kinds import (
@@ -239,7 +239,8 @@ def simulate_parts(
         if duration is not None or axis is not None:
             raise InputError("an experiment has its own duration and axis; leave them out")
         name, chosen = kind_of(experiment), experiment
-        text = format_experiment(experiment, units=driven_units(experiment, model))
+        driven = experiment.axis if isinstance(experiment, OneAxis) else next(iter(model.axes))
+        text = format_experiment(experiment, units=model.axis(driven).units)
         attached = {"experiment.toml": text.encode()}
     setpoint = setpoint_of(chosen, model, seed)
     controllers = None if chosen.closed_loop else {a: Controller() for a in model.axes}

@@ -311,8 +311,7 @@ class _Function(Typed):
         kind = self.types.get(array)
         if kind not in (P, S, IO):
             raise CannotTranslate(f"`{array}` is none of the arrays p, s and io")
-        named = isinstance(index, ast.Name) and index.id not in self.types
-        if kind == IO and named and isinstance(index, ast.Name):
+        if kind == IO and isinstance(index, ast.Name) and index.id not in self.types:
             for slot, value in SLOTS.items():
                 if value == self._constant(index):
                     return f"IO_{slot}"

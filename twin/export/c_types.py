@@ -11,6 +11,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Iterator
+from functools import reduce
 from types import FunctionType
 from typing import Any
 
@@ -119,10 +120,7 @@ class Typed:
         if called is int:
             return WHOLE
         if called in (abs, min, max):
-            found: Type = WHOLE
-            for own in types:
-                found = _wider(found, own)
-            return found
+            return reduce(_wider, types, WHOLE)
         if isinstance(called, FunctionType):
             return self.returned_by(called, types)
         return REAL

@@ -109,7 +109,7 @@ def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
 
 
 def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTables:
-    """The tables of an axis over ``reach``, m,, up to a speed in m/s."""
+    """The tables of an axis over ``reach``, m, up to a speed in m/s."""
     shown = [
         f for f in followed(axis).axis.effects
         if f.effect.kind in (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)

@@ -15,6 +15,7 @@ from twin.logs.series import instant
 from twin.numbers import first_not_finite
 
 JITTER = 0.01  # of a period: how far a time may be off the even grid
+LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
 
 
 def rate_of(time: Array) -> float:
@@ -57,9 +58,6 @@ def even_times(begin: float, end: float, rate: float) -> Array:
     return begin + np.arange(int((end - begin) * rate * (1.0 + 1e-12)) + 1) / rate
 
 
-LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
-
-
 @dataclass(frozen=True)
 class Clock:
     """rows: those kept, in the order of time; times: (n,) s of them; grid: (m,) s, even."""
@@ -73,29 +71,22 @@ class Clock:
         """A column (rows of the file,) on the even clock, by straight lines."""
         return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
 
-    def cost(self, column: Array) -> float:
-        """RMS error of the straight lines, told from the lines between every other row."""
-        kept = column[self.rows]
-        between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
-        # Of a smooth signal lines twice as long are four times as far off.
-        return float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
-
     def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
-        """What the clock costs each signal of a map, one sentence."""
-        each = [
-            f"{axis}.{field} {c.si.size * abs(float(c.scale)) * self.cost(columns[c.name]):.2g} "
-            f"{entry.units[field]}"
-            for axis, entry in mapping.axes.items()
-            for field, c in entry.columns.items()
-        ]
-        return f"{self}; error rms about {', '.join(each)}"
-
-    def __str__(self) -> str:
-        steps = np.diff(self.times) * 1e3
+        """What was resampled, and the RMS error of the straight lines in each signal of a map."""
+        steps, each = np.diff(self.times) * 1e3, []
+        for axis, entry in mapping.axes.items():
+            for field, c in entry.columns.items():
+                kept = columns[c.name][self.rows]
+                between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
+                # Of a smooth signal lines twice as long are four times as far off.
+                rms = float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+                size = c.si.size * abs(float(c.scale)) * rms
+                each.append(f"{axis}.{field} {size:.2g} {entry.units[field]}")
         dropped = f", {self.dropped} rows with a time that does not increase left out"
         return (
             f"steps of {steps.min():.3g} to {steps.max():.3g} ms were resampled to "
-            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}"
+            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}; "
+            f"error rms about {', '.join(each)}"
         )
 
 

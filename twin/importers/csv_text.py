@@ -28,8 +28,6 @@ END = "EOF"  # the last line of an export, where it was asked for
 _NAME, _SYMBOL, _STEP = "Name", "SymbolName", "SampleTime[ms]"
 _STARTS = ("StartRecord", "Starttime of export", "StartTime")
 _UNIX_EPOCH = 116_444_736_000_000_000  # in 100 ns since 1601
-
-
 _HEAD_BYTES = 1 << 16
 _SAMPLE_LINES = 20
 _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space

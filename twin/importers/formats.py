@@ -36,6 +36,13 @@ from twin.isolated import isolated
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
+ROWS = "data"  # what the rows of a bare list are called in JSON
+_PERIOD = "wf_increment"  # s a sample, of TDMS
+SHORTEST = 5.0  # s that a MAT file may take, whatever its size
+SLOWEST = 2e7  # bytes of its content a second
+COPIES = 4  # of its content, that SciPy and the way back to this process take
+_HEADER, _COMPRESSED = 128, 15
+_FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of them, at once
 
 
 def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
@@ -64,9 +71,6 @@ def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
                         columns |= split_columns(key, column)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
         return Table({name: columns[name] for name in chosen(wanted, columns)})
-
-
-ROWS = "data"  # what the rows of a bare list are called
 
 
 def read_json(path: Path, mapping: ImportMap) -> Table:
@@ -118,9 +122,6 @@ def read_parquet(path: Path, mapping: ImportMap) -> Table:
         return Table({name: table.column(name).to_numpy() for name in wanted})
 
 
-_PERIOD = "wf_increment"  # s a sample
-
-
 def read_tdms(path: Path, mapping: ImportMap) -> Table:
     """Columns of a TDMS file; raises InputError."""
     nptdms = extra("nptdms")
@@ -138,13 +139,6 @@ def read_tdms(path: Path, mapping: ImportMap) -> Table:
                 )
         rate = 1.0 / next(iter(periods.values())) if periods else None
         return Table({name: c[:] for name, c in read.items()}, rate)
-
-
-SHORTEST = 5.0  # s that a file may take, whatever its size
-SLOWEST = 2e7  # bytes of content a second
-COPIES = 4  # of its content, that SciPy and the way back to this process take
-_HEADER, _COMPRESSED = 128, 15
-_FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of them, at once
 
 
 def read_mat(path: Path, mapping: ImportMap) -> Table:

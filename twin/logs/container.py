@@ -26,6 +26,10 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 _FOOTER_SIZE = RECORD_HEAD.size + 20
 IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
+LARGEST_RATIO = 256  # of what any format of this house shrinks to
+LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
+USUAL_RATIO = 16  # samples of a drive shrink by 2 to 10
 
 T = TypeVar("T")
 
@@ -215,12 +219,6 @@ def open_mcap(path: Path) -> Iterator[McapFile]:
     """Open ``path``; every failure is an InputError that names the file."""
     with reading(path), open(path, "rb") as stream:
         yield McapFile(FileBytes(stream))
-
-
-SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
-LARGEST_RATIO = 256  # of what any format of this house shrinks to
-LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
-USUAL_RATIO = 16  # samples of a drive shrink by 2 to 10
 
 
 class Inflation:

@@ -24,6 +24,7 @@ LINEAR_UNITS = {
     "force": "N",
 }
 FIELDS = tuple(LINEAR_UNITS)
+HELD = ("current", "force")  # held over a sample, so that their mean acts; all others are readings
 ROTARY_UNITS = {name: rotary_unit(unit) for name, unit in LINEAR_UNITS.items()}
 
 
@@ -173,9 +174,6 @@ def in_multiples(parts: Iterable[Log], count: int) -> Iterator[Log]:
         held = whole.part(stop, len(whole)).copied()
     if held is not None and len(held):
         yield held
-
-
-HELD = ("current", "force")  # held over a sample, so that their mean acts; all others are readings
 
 
 def thinned(log: Log, every: int) -> Log:

@@ -97,7 +97,6 @@ _HEAD = [
     (".log_time", "<u8"),
     (".publish_time", "<u8"),
 ]
-HEAD_BYTES = np.dtype(_HEAD).itemsize
 _OUTSIDE_LENGTH = 9  # opcode and length, which the record's length does not count
 _VARYING = (".sequence", ".log_time", ".publish_time")
 

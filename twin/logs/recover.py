@@ -53,6 +53,15 @@ METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
 INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time: some 20 MB
 STEP = 1 << 15  # the same of a damaged one, whose chunks are held beside them
 
+_HEAD = struct.Struct("<BQQQQI8sQ")  # of a chunk, up to its data
+_ZSTD = b"\x04\0\0\0zstd"
+_NAME_AT = _HEAD.size - len(_ZSTD) - 8  # of the compression, in the head
+_WINDOW = 1 << 18  # bytes that are searched at a time
+_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
+_OPCODES = frozenset(Opcode)
+_Kept = tuple[str, Callable[[], Iterator[Log]]]
+"""A stretch of samples: what it is, and its logs, which follow each other."""
+
 
 @dataclass(frozen=True)
 class Recovery:
@@ -70,10 +79,6 @@ class Recovery:
     def __str__(self) -> str:
         lost = self.lost or ("nothing was lost",)
         return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
-
-
-_Kept = tuple[str, Callable[[], Iterator[Log]]]
-"""A stretch of samples: what it is, and its logs, which follow each other."""
 
 
 def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:
@@ -129,14 +134,6 @@ def _intact(path: Path) -> Iterator[Log]:
     """A log in which no fault is found, in parts; raises InputError."""
     with open_mcap(path) as file:
         yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
-
-
-_HEAD = struct.Struct("<BQQQQI8sQ")  # of a chunk, up to its data
-_ZSTD = b"\x04\0\0\0zstd"
-_NAME_AT = _HEAD.size - len(_ZSTD) - 8  # of the compression, in the head
-_WINDOW = 1 << 18  # bytes that are searched at a time
-_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
-_OPCODES = frozenset(Opcode)
 
 
 @dataclass(frozen=True)

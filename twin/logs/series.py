@@ -14,6 +14,8 @@ from twin.logs.topics import Topic
 from twin.numbers import first_not_finite
 
 EARLIEST, LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
+ROUNDING = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
+LATEST_TIME = 1 << 62  # ns, 146 years: no clock of a machine, and no sum of two overflows
 
 
 def is_calendar(seconds: float) -> bool:
@@ -34,10 +36,6 @@ def seconds(nanoseconds: float) -> str:
 def instant(time: float) -> str:
     """A time in s for a message, to the microsecond where it counts since 1970."""
     return seconds(round(time * 1e6) * 1000) if is_calendar(time) else f"{time:.9g} s"
-
-
-ROUNDING = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
-LATEST_TIME = 1 << 62  # ns, 146 years: no clock of a machine, and no sum of two overflows
 
 
 class Series:

@@ -23,7 +23,6 @@ from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
 from twin.errors import InputError
-from twin.experiments.experiment import driven_units
 from twin.experiments.file import format_experiment
 from twin.experiments.kinds import Passes
 from twin.experiments.named import simulate
@@ -44,7 +43,7 @@ def test_a_plan_is_in_units_of_the_axis() -> None:
     assert "N·m RMS unexplained" in shown
     assert stated_units(as_json.json_of(chosen)) == {"N m", "s"}
     planned = Passes("c", span=0.3, speed=0.2, repeats=1)
-    file = format_experiment(planned, units=driven_units(planned, model))
+    file = format_experiment(planned, units=model.axis("c").units)
     assert "# rad, length of a pass" in file
     assert "# rad/s, held" in file
 

@@ -25,7 +25,6 @@ from twin.mujoco.mjcf import read_spec
 from twin.mujoco.written import in_mjcf, with_joint
 from twin.signals import Array, between
 
-Attributes = Mapping[str, float]
 KEPT = 0.01  # least part of an effect's force that is told to be lost
 HALF = 0.5  # where more is lost than held, the effect is called lost
 UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
@@ -108,7 +107,7 @@ def _judged(
 
 
 def _sizes(
-    alone: AxisModel, held: Attributes, motions: list[tuple[Array, float]]
+    alone: AxisModel, held: Mapping[str, float], motions: list[tuple[Array, float]]
 ) -> tuple[float, float]:
     """N RMS of one effect while the axis moves, and of what the attributes lose of it."""
     whole, left = [], []
