@@ -145,37 +145,25 @@ def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | Non
 def _finding(axis: Axis, fault: Fault, found: list[Break]) -> Finding:
     first, largest = found[0], max(found, key=lambda b: abs(b.size))
     size = f"{abs(largest.size):.3g} {axis.log.units['position']}"
-    what, remedy = {
-        Fault.MISSING: (
-            f"{largest.size:.0f} samples are missing, the motion goes on behind",
-            "import the file with its time stamps, or cut the log there",
-        ),
-        Fault.STUCK: (
-            f"the position stands still for {(first.last - first.first) / axis.sample_rate:.3g} s "
-            f"and is {size} farther in the next sample: the encoder was stuck",
-            "cut the log there, and check the encoder's connection",
-        ),
-        Fault.WRAPPED: (
-            f"the position goes back by {size} in one sample: its counter wraps",
-            f"add {size} behind each wrap before the import",
-        ),
-        Fault.OUTLIERS: (
-            f"samples of the position are off by up to {size}",
-            "repair these samples, or cut the log there",
-        ),
-        Fault.JOINED: (
-            f"position and motion differ on both sides by {size}: logs were joined",
-            "import each part as a log of its own",
-        ),
-        Fault.STEP: (
-            f"the position steps by {size} and goes on as before: counts were lost",
-            "cut the log there, and check the encoder's connection",
-        ),
-        Fault.UNEVEN: (
-            f"the position is off by {size}, less than two samples' motion: a clock skipped",
-            "record with the drive's own clock",
-        ),
-    }[fault]  # fmt: skip
+    still = (first.last - first.first) / axis.sample_rate
+    what = {
+        Fault.MISSING: f"{largest.size:.0f} samples are missing, the motion goes on behind",
+        Fault.STUCK: f"the position stands still for {still:.3g} s and is {size} farther in the "
+        "next sample: the encoder was stuck",
+        Fault.WRAPPED: f"the position goes back by {size} in one sample: its counter wraps",
+        Fault.OUTLIERS: f"samples of the position are off by up to {size}",
+        Fault.JOINED: f"position and motion differ on both sides by {size}: logs were joined",
+        Fault.STEP: f"the position steps by {size} and goes on as before: counts were lost",
+        Fault.UNEVEN: f"the position is off by {size}, less than two samples' motion: a clock "
+        "skipped",
+    }[fault]
+    remedy = {
+        Fault.MISSING: "import the file with its time stamps, or cut the log there",
+        Fault.WRAPPED: f"add {size} behind each wrap before the import",
+        Fault.OUTLIERS: "repair these samples, or cut the log there",
+        Fault.JOINED: "import each part as a log of its own",
+        Fault.UNEVEN: "record with the drive's own clock",
+    }.get(fault, "cut the log there, and check the encoder's connection")
     told = axis.warning if fault is Fault.UNEVEN else axis.error
     where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s"
     return told(fault, what, remedy, where + and_more(len(found)))
@@ -200,11 +188,9 @@ def uneven_bends(axis: Axis) -> NDArray[np.intp]:
 def held(axis: Axis, name: str, count: int) -> Finding:
     """A signal that is held for ``count`` samples."""
     rate = axis.sample_rate / count
-    return axis.warning(
-        Fault.HELD,
-        f"{name} changes at every {count}th sample only: it was sampled at {rate:g} Hz and held",
-        f"record it at {axis.sample_rate:g} Hz, or the log at {rate:g} Hz",
-    )
+    what = f"{name} changes at every {count}th sample only: it was sampled at {rate:g} Hz and held"
+    remedy = f"record it at {axis.sample_rate:g} Hz, or the log at {rate:g} Hz"
+    return axis.warning(Fault.HELD, what, remedy)
 
 
 def check_outliers(axis: Axis) -> Iterator[Finding]:

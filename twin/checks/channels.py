@@ -87,10 +87,8 @@ def _lagging(
     """That a signal is so many s behind the other, and the remedy for the column which is late."""
     side, column = ("behind", late) if lag > 0.0 else ("ahead of", early)
     samples = abs(lag) * axis.sample_rate
-    return (
-        f"{name} is {abs(lag) * 1e3:.3g} ms ({samples:.3g} samples) {side} {other}",
-        f"give {column} delay_samples = {round(samples)} in the import map",
-    )
+    what = f"{name} is {abs(lag) * 1e3:.3g} ms ({samples:.3g} samples) {side} {other}"
+    return what, f"give {column} delay_samples = {round(samples)} in the import map"
 
 
 _SLIPS: Mapping[float, str] = {
@@ -180,11 +178,9 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
         if not near and pair.follows and axis.soft_loop:
             return
         wrong = f"it looks like {near[0]}" if near else "a scale or the sample rate is wrong"
-    yield axis.error(
-        Fault.SIGN if ratio < 0.0 else Fault.UNIT,
-        f"{pair.name} is {ratio:.4g} times {pair.other_name}: {wrong}",
-        "correct unit, scale, sign or sample rate in the import map",
-    )
+    fault = Fault.SIGN if ratio < 0.0 else Fault.UNIT
+    what = f"{pair.name} is {ratio:.4g} times {pair.other_name}: {wrong}"
+    yield axis.error(fault, what, "correct unit, scale, sign or sample rate in the import map")
 
 
 def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:

@@ -25,13 +25,10 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     least = limits.LARGE_SAMPLE * axis.force_size
     steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
     if steps > least and len(single := _single(off := off_course(force), least)):
-        first = single[0] / axis.sample_rate
-        yield axis.error(
-            Fault.OUTLIERS,
-            f"single samples of the force are off by up to {off.max():.3g} {unit}",
-            "repair these samples, or cut the log there",
-            f"{first:.6g} s{and_more(len(single))}",
-        )
+        what = f"single samples of the force are off by up to {off.max():.3g} {unit}"
+        where = f"{single[0] / axis.sample_rate:.6g} s{and_more(len(single))}"
+        remedy = "repair these samples, or cut the log there"
+        yield axis.error(Fault.OUTLIERS, what, remedy, where)
     # noise that hides what the motion does not explain, even when it is averaged
     noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
     left = float(np.median(np.abs(axis.dynamics.residual)))

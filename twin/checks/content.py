@@ -26,12 +26,10 @@ def check_content(axis: Axis) -> Iterator[Finding]:
     for name, column in axis.log.columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
-            yield axis.error(
-                Fault.NOT_FINITE,
-                f"{name} is not a finite number in {len(bad)} of {len(column)} samples",
-                "cut the log there, or leave the signal out if it was not recorded",
-                f"from {bad[0] / axis.sample_rate:.6g} s",
-            )
+            what = f"{name} is not a finite number in {len(bad)} of {len(column)} samples"
+            remedy = "cut the log there, or leave the signal out if it was not recorded"
+            where = f"from {bad[0] / axis.sample_rate:.6g} s"
+            yield axis.error(Fault.NOT_FINITE, what, remedy, where)
     flat = {n: c[0] for n, c in axis.log.columns.items() if len(c) and np.all(c == c[0])}
     for name in (n for n in READINGS if n in flat):
         what = f"{name} is {flat[name]:.6g} {axis.log.units[name]} throughout"
@@ -40,11 +38,8 @@ def check_content(axis: Axis) -> Iterator[Finding]:
         else:
             yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
     if axis.duration < limits.SHORTEST:
-        yield axis.error(
-            Fault.TOO_SHORT,
-            f"the log lasts {axis.duration:.3g} s, a fit needs {limits.SHORTEST:g} s",
-            "record longer",
-        )
+        what = f"the log lasts {axis.duration:.3g} s, a fit needs {limits.SHORTEST:g} s"
+        yield axis.error(Fault.TOO_SHORT, what, "record longer")
 
 
 def _missing(axis: Axis) -> Iterator[Finding]:
@@ -52,11 +47,9 @@ def _missing(axis: Axis) -> Iterator[Finding]:
     if "position" not in columns:
         yield axis.error(Fault.INCOMPLETE, "there is no position", "record the encoder")
     if "force" not in columns and not ("current" in columns and axis.log.force_constant):
-        yield axis.error(
-            Fault.INCOMPLETE,
-            "there is no force, nor a current with a force constant",
-            f"add the command, or force_constant ({axis.log.kind('N/A')}) to the axis",
-        )
+        what = "there is no force, nor a current with a force constant"
+        remedy = f"add the command, or force_constant ({axis.log.kind('N/A')}) to the axis"
+        yield axis.error(Fault.INCOMPLETE, what, remedy)
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{name} {length}" for name, length in lengths.items())

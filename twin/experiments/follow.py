@@ -42,13 +42,9 @@ def follow_parts(
     noise: draws that of encoders and currents. name, seed: for the log's metadata. controllers: by
     axis; the model's own where None.
     """
-    metadata = {
-        "source": "simulation",
-        "experiment": name,
-        "seed": str(seed),
-        "software": f"proton-twin {software_version()}",
-        "mujoco": software_version("mujoco"),
-    }
+    metadata = {"source": "simulation", "experiment": name, "seed": str(seed)}
+    metadata["software"] = f"proton-twin {software_version()}"
+    metadata["mujoco"] = software_version("mujoco")
     attachments = {"model.toml": format_model(model).encode()}
     if model.mjcf:
         attachments["model.xml"] = model.mjcf.encode()

@@ -170,16 +170,13 @@ def _axis(model: MachineModel, name: str, a: AxisCode) -> Iterator[str]:
         return f"{number!r} /* {label}: {_plain(units(unit))}, {_plain(meaning)}{band} */"
 
     mass = a.axis.mass_parameter
-    yield (
-        f"static const double {a.prefix}_mass = "
-        f"{value(a.axis.mass, mass.unit, mass.meaning, mass.name).replace(' /*', '; /*')}"
-    )
+    stated = value(a.axis.mass, mass.unit, mass.meaning, mass.name).replace(" /*", "; /*")
+    yield f"static const double {a.prefix}_mass = {stated}"
     for f, _ in a.laws:
-        own = [
+        listed = ",\n    ".join(
             value(f.values[p.name], p.unit, p.meaning, f"{f.effect.name}.{p.name}")
             for p in f.effect.parameters
-        ]
-        listed = ",\n    ".join(own)
+        )
         yield f"static const double {a.prefix}_{f.effect.name}[] = {{\n    {listed},\n}};"
     body = [f"    {line}" if line else "" for line in _body(model, name, a)]
     yield "\n".join([_signature(a, "force"), "{", *body, "}"])

@@ -146,11 +146,9 @@ def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -
     places = [k for k, name in enumerate(names) if name == TIME]
     for number, k in enumerate(places[1:], 2):
         names[k] = f"{TIME}[{number}]"
-    starts = [
-        100 * (int(row[1]) - _UNIX_EPOCH)
-        for row in rows[:first]
-        if len(row) > 1 and row[0] in _STARTS and row[1].isdigit() and int(row[1]) > _UNIX_EPOCH
-    ]
+    stated = (row[1] for row in rows[:first] if len(row) > 1 and row[0] in _STARTS)
+    ticks = (int(cell) - _UNIX_EPOCH for cell in stated if cell.isdigit())
+    start_ns = next((100 * t for t in ticks if t > 0), None)
     steps = sorted({style.value(cell) for cell in rows[step] if style.is_number(cell)})
     if len(steps) > 1:
         raise InputError(
@@ -158,7 +156,7 @@ def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -
             "those of one sample time at once"
         )
     rate = 1e3 / steps[0] if steps and steps[0] > 0.0 else None
-    return _Layout(encoding, style, tuple(names[:width]), first, rate, next(iter(starts), None))
+    return _Layout(encoding, style, tuple(names[:width]), first, rate, start_ns)
 
 
 def _encoding(head: bytes) -> str:

@@ -74,10 +74,8 @@ def leaders(columns: Columns, names: Sequence[str], signal: Array, step: float) 
     for name in names:
         other = means(columns[name], step)
         count = min(len(signal), len(other)) - reach
-        shifts = [
-            (_correlation(signal[reach:count], other[reach - k : count - k]), k)
-            for k in range(-reach, reach + 1)
-        ]
+        own, lags = signal[reach:count], range(-reach, reach + 1)
+        shifts = [(_correlation(own, other[reach - k : count - k]), k) for k in lags]
         likeness, ahead = max(shifts)
         if likeness > _FOLLOWS:
             slope = float(np.std(other) / np.std(signal))
@@ -403,13 +401,11 @@ def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
         digits = re.findall(r"\d+", name.rpartition("/")[2])
         axis = letters[0] if letters else f"axis{digits[-1]}" if digits else (rest or ["x"])[-1]
         out.setdefault(axis, []).append(name)
-    whole = {
-        axis: names
-        for axis, names in out.items()
-        if IDENTIFIER.fullmatch(axis)
-        and "position" in (found := named(names))
-        and {"force", "current"} & found.keys()
-    }
+    whole = {}
+    for axis, names in out.items():
+        found = named(names).keys()
+        if IDENTIFIER.fullmatch(axis) and "position" in found and {"force", "current"} & found:
+            whole[axis] = names
     return whole or {"x": list(columns)}
 
 

@@ -90,10 +90,8 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     begin = max(clock.times[0] for _, _, clock in clocks)
     end = min(clock.times[-1] for _, _, clock in clocks)
     if not (end - begin) * rate >= 2.0:
-        spans = "; ".join(
-            f"{path} {instant(clock.times[0])} to {instant(clock.times[-1])}"
-            for path, (_, _, clock) in zip(paths, clocks, strict=True)
-        )
+        ends = ((instant(clock.times[0]), instant(clock.times[-1])) for _, _, clock in clocks)
+        spans = "; ".join(f"{p} {a} to {b}" for p, (a, b) in zip(paths, ends, strict=True))
         raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
     grid = even_times(begin, end, rate)
     even: dict[str, Array] = {}

@@ -27,16 +27,12 @@ def _files(name: str, axis: AxisModel, of: AxisTables) -> dict[str, str]:
     force, position = f"{units.words('force')} ({units.force})", f"({units.position})"
     place = f"{units.words('position')} {position}"
     mass = f"{units.mass_name} ({units.mass})"
+    speed = {f"speed ({units.velocity})": of.speeds, f"{force} forwards": of.forwards}
+    speed[f"{force} backwards"] = of.backwards
     files = {
         f"{name}_{units.mass_name}.csv": csv_text({mass: np.array([of.mass])}),
         f"{name}_position.csv": csv_text({place: of.positions, force: of.along}),
-        f"{name}_speed.csv": csv_text(
-            {
-                f"speed ({units.velocity})": of.speeds,
-                f"{force} forwards": of.forwards,
-                f"{force} backwards": of.backwards,
-            }
-        ),
+        f"{name}_speed.csv": csv_text(speed),
     }
     for p in of.periodic:
         at = p.period * np.arange(len(p.force)) / len(p.force)

@@ -34,18 +34,12 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     made = c_source(model)
     wrapper = WRAPPER.read_text(encoding="utf-8")
     guid = hashlib.sha256((made.header + made.source + wrapper).encode()).hexdigest()[:32]
-    sources = {
-        "fmi2.c": wrapper,
-        "model.h": _model_header(made, guid),
-        f"{made.name}.c": made.source,
-        f"{made.name}.h": made.header,
-    }
+    sources = {"fmi2.c": wrapper, "model.h": _model_header(made, guid)}
+    sources |= {f"{made.name}.c": made.source, f"{made.name}.h": made.header}
     binary, why = _compiled(made.name, sources)
-    files: dict[str, str | bytes] = {
-        "modelDescription.xml": _description(model, made, guid),
-        **{f"sources/{name}": text for name, text in sources.items()},
-        **binary,
-    }
+    files: dict[str, str | bytes] = {"modelDescription.xml": _description(model, made, guid)}
+    files |= {f"sources/{name}": text for name, text in sources.items()}
+    files |= binary
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

@@ -69,11 +69,8 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     if there is None:
         raise InputError(f"{name}: has no joint '{joint}', which is axis {axis}; name them alike")
     given = {key: np.ravel(getattr(there, key)) for key in PASSIVE}
-    new = {
-        key: wanted.get(key, 0.0)
-        for key, values in given.items()
-        if values[0] != wanted.get(key, 0.0) or np.any(values[1:])
-    }
+    zeroed = {key: wanted.get(key, 0.0) for key in given}
+    new = {key: v for key, v in zeroed.items() if given[key][0] != v or np.any(given[key][1:])}
     if "springref" in wanted:
         in_degrees = spec.compiler.degree and own.rotary
         new["springref"] = np.degrees(wanted["springref"]) if in_degrees else wanted["springref"]

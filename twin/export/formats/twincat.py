@@ -76,10 +76,8 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
         phase = np.arange(ENTRIES) * 360.0 / ENTRIES
         unit = f"force ({units.force})" if not known else "current (A)"
         files[f"{name}_{p.name}.csv"] = csv_text({"phase (deg)": phase, unit: p.force / constant})
-        rows = [
-            f"{k},{abs(c) / constant:.9g},{degrees(np.angle(c)):.9g}"
-            for k, c in p.harmonics().items()
-        ]
+        terms = p.harmonics().items()
+        rows = [f"{k},{abs(c) / constant:.9g},{degrees(np.angle(c)):.9g}" for k, c in terms]
         head = f"harmonic (1),amplitude of the {unit},phase of the cosine (deg)"
         files[f"{name}_{p.name}_harmonics.csv"] = "\n".join([head, *rows]) + "\n"
     return files
