@@ -20,6 +20,8 @@ from twin.checks.axis import Axis
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
+CUT = "cut the log there (was an end stop hit, the carriage touched?)"
+
 
 @dataclass(frozen=True)
 class Break:
@@ -252,12 +254,7 @@ def _usual(axis: Axis, values: Array) -> float:
     return float(np.quantile(values, 1.0 - max(0.01, burst)))
 
 
-def _outliers(
-    axis: Axis,
-    times: Array,
-    what: str,
-    remedy: str = "cut the log there (was an end stop hit, the carriage touched?)",
-) -> Finding:
+def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> Finding:
     bursts = np.split(times, np.flatnonzero(np.diff(times) > limits.BURSTS_APART) + 1)
     where = f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{and_more(len(bursts))}"
     return axis.error(Fault.OUTLIERS, what, remedy, where)

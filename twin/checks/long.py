@@ -43,13 +43,11 @@ def together(parts: Sequence[Part]) -> CheckReport:
     for part in parts:
         for f in part.report.findings:
             found.setdefault((f.axis, f.fault), {}).setdefault(part.start, (part, f))
-    return CheckReport(
-        tuple(
-            _said(list(seen.values()), len(parts))
-            for (_, fault), seen in found.items()
-            if fault not in OF_THE_WHOLE or len(seen) == len(parts)
-        )
-    )
+    said = []
+    for (_, fault), seen in found.items():
+        if fault not in OF_THE_WHOLE or len(seen) == len(parts):
+            said.append(_said(list(seen.values()), len(parts)))
+    return CheckReport(tuple(said))
 
 
 def _said(seen: Sequence[tuple[Part, Finding]], parts: int) -> Finding:

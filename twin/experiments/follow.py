@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 
 import numpy as np
+from numpy.random import Generator
 
 from twin.core.control import Controller
 from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
@@ -29,7 +30,7 @@ DRAWN = 1 << 16  # numbers drawn at once, to be thrown away
 def follow_parts(
     model: MachineModel,
     setpoint: AnySetpoint,
-    noise: tuple[np.random.Generator, np.random.Generator],
+    noise: tuple[Generator, Generator],
     *,
     name: str,
     seed: int,
@@ -63,9 +64,7 @@ def follow_parts(
         first += len(part)
 
 
-def _one_after_the_other(
-    rng: np.random.Generator, count: int, samples: int
-) -> list[np.random.Generator]:
+def _one_after_the_other(rng: Generator, count: int, samples: int) -> list[Generator]:
     """Generators, each of which draws the normal numbers that follow those of the one before."""
     out = []
     for _ in range(count):
@@ -76,7 +75,7 @@ def _one_after_the_other(
 
 
 def _recorded(
-    axis: AxisModel, setpoint: Setpoint, part: Run, index: int, rng: np.random.Generator
+    axis: AxisModel, setpoint: Setpoint, part: Run, index: int, rng: Generator
 ) -> AxisLog:
     """What the machine records of an axis; rng draws the noise of its current."""
     signals = part.signals[:, index]

@@ -384,13 +384,11 @@ def _there_and_back(driven: Driven, half: float, speed: float, dwell: float) -> 
     return [move(slow, low, high), rest(high, dwell), move(slow, high, low), rest(low, dwell)]
 
 
-def _passes(
-    driven: Driven, span: float, speed: float, dwell: float, repeats: int
-) -> PlannedSetpoint:
+def _passes(driven: Driven, span: float, speed: float, dwell: float, times: int) -> PlannedSetpoint:
     """There and back again and again, the speed held over at least half of the span."""
     driven.limits[driven.index].require_plateau(speed, span)
     cycle = _there_and_back(driven, span / 2.0, speed, dwell)
-    return _repeated(cycle, repeats, driven.model.sample_rate)
+    return _repeated(cycle, times, driven.model.sample_rate)
 
 
 def _repeated(cycle: list[Phases], repeats: int, sample_rate: float) -> PlannedSetpoint:

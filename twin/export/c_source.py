@@ -19,6 +19,7 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 OTHER = ("X_OTHER", "V_OTHER", "A_OTHER")
 MOTION = ("position", "velocity", "acceleration")
+Laws = list[tuple[Fitted, str]]
 IMPOSED = "1e300"  # kg: along an imposed motion friction slides wherever it moves
 
 
@@ -232,7 +233,7 @@ def _body(model: MachineModel, name: str, a: AxisCode) -> Iterator[str]:
     yield "return command;"
 
 
-def _structure(model: MachineModel, a: AxisCode, laws: list[tuple[Fitted, str]]) -> Iterator[str]:
+def _structure(model: MachineModel, a: AxisCode, laws: Laws) -> Iterator[str]:
     """Statements that add the force of attached masses: twin.core.native.along for one sample."""
     if not laws:
         return
@@ -255,9 +256,7 @@ def _structure(model: MachineModel, a: AxisCode, laws: list[tuple[Fitted, str]])
         yield "}"
 
 
-def _shared(
-    a: AxisCode, riding: list[tuple[Fitted, str]], standing: list[tuple[Fitted, str]]
-) -> Iterator[str]:
+def _shared(a: AxisCode, riding: Laws, standing: Laws) -> Iterator[str]:
     """Statements that share an acceleration out between axis and base: the laws are linear."""
     yield "double pushed = 0.0, rides = 0.0, moved = 0.0, yields = 0.0;"
     yield "io[IO_WHEN] = 0.0; /* asked only: no state changes */"

@@ -358,7 +358,7 @@ def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
     return {name: column for name, column in out.items() if len(column) == longest}
 
 
-def _time(columns: Mapping[str, Array]) -> str | None:
+def _time(columns: Columns) -> str | None:
     """The column of time stamps: it rises, and is called so or rises evenly."""
     rising = {n: c for n, c in columns.items() if np.mean(np.diff(c) > 0.0) > 0.9}
     called = [n for n in rising if set(words_of(n)) & set(_TIME_WORDS)]
@@ -366,9 +366,7 @@ def _time(columns: Mapping[str, Array]) -> str | None:
     return next(iter([*called, *even]), None)
 
 
-def _clock(
-    columns: Mapping[str, Array], time: str | None, stated: float | None
-) -> tuple[list[str], float]:
+def _clock(columns: Columns, time: str | None, stated: float | None) -> tuple[list[str], float]:
     """The lines of the clock, and the step in s."""
     if stated is not None:
         return [f"# the file states its sample rate: {stated:g} Hz"], 1.0 / stated
@@ -390,7 +388,7 @@ def _clock(
     return lines, seconds
 
 
-def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
+def _axes(columns: Columns) -> dict[str, list[str]]:
     """Columns by axis: what a name has beside the words of signals and units tells the axis."""
     told = (*WORDS.values(), ASKED, OTHER)
     every = {w for words in told for w in words if len(w) > 1}
@@ -410,7 +408,7 @@ def _axes(columns: Mapping[str, Array]) -> dict[str, list[str]]:
 
 
 def _entry(
-    field: str, signal: Signal, columns: Mapping[str, Array], rotary: bool,
+    field: str, signal: Signal, columns: Columns, rotary: bool,
     position: Signal | None, step: float,
 ) -> str:  # fmt: skip
     """One line of the map, with the reason behind it."""

@@ -27,6 +27,7 @@ from twin.logs.log import HELD, Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
 from twin.numbers import first_not_finite
 
+Columns = Mapping[str, Array]
 Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint -> ratio
 FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], Table]]] = {
     "csv": ((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
@@ -77,7 +78,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
             "give one for each, in the same order"
         )
     assert rate is not None
-    clocks: list[tuple[ImportMap, Mapping[str, Array], Clock]] = []
+    clocks: list[tuple[ImportMap, Columns, Clock]] = []
     facts: dict[str, str] = {}
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
@@ -104,7 +105,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     return _log(mapping, even, rate, facts)
 
 
-def _times(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> Array:
+def _times(table: Table, mapping: ImportMap, columns: Columns) -> Array:
     """The times (n,) of the rows of one of several files, s."""
     if mapping.time is None:
         rate = _sample_rate(table, mapping, columns)
@@ -123,7 +124,7 @@ def table_of(path: Path, mapping: ImportMap) -> Table:
 
 def _read(
     path: Path, mapping: ImportMap
-) -> tuple[Table, Mapping[str, Array], dict[str, str], dict[str, float]]:
+) -> tuple[Table, Columns, dict[str, str], dict[str, float]]:
     """The table, its columns as numbers, format and sha256 of the file, and scalars by name."""
     name = _format_name(path, mapping)
     with open(path, "rb") as stream:
@@ -148,9 +149,7 @@ def _scalar(name: str, values: Array) -> float:
     )
 
 
-def _log(
-    mapping: ImportMap, columns: Mapping[str, Array], rate: float, facts: Mapping[str, str]
-) -> Log:
+def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, str]) -> Log:
     """The log of columns that are sampled at ``rate`` (Hz); raises InputError."""
     for name, values in columns.items():
         if (k := first_not_finite(values)) is not None:
@@ -185,7 +184,7 @@ def _log(
     return Log(rate, at_joints(axes, gears), metadata)
 
 
-def _start(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> dict[str, str]:
+def _start(table: Table, mapping: ImportMap, columns: Columns) -> dict[str, str]:
     """When the recording began by the wall clock, where the format or its times say so."""
     start = table.start_ns
     if start is None and mapping.time is not None:
@@ -211,7 +210,7 @@ def _format_name(path: Path, mapping: ImportMap) -> str:
     return name
 
 
-def _common_length(columns: Mapping[str, Array]) -> int:
+def _common_length(columns: Columns) -> int:
     first, values = next(iter(columns.items()))
     for name, other in columns.items():
         if len(other) != len(values):
@@ -224,7 +223,7 @@ def _common_length(columns: Mapping[str, Array]) -> int:
     return len(values)
 
 
-def _sample_rate(table: Table, mapping: ImportMap, columns: Mapping[str, Array]) -> float:
+def _sample_rate(table: Table, mapping: ImportMap, columns: Columns) -> float:
     if mapping.time is not None:
         dated = table.columns[mapping.time.name].dtype.kind == "M"
         if dated and mapping.time.seconds != 1.0:

@@ -337,12 +337,10 @@ def common_rate(topics: Iterable[Topic], extras: Extras) -> float:
     return rate
 
 
-def assembled(
-    columns: Iterable[tuple[Topic, dict[str, Array]]], rate: float, extras: Extras
-) -> Log:
+def assembled(topics: Iterable[tuple[Topic, dict[str, Array]]], rate: float, extras: Extras) -> Log:
     """The log of topics with their columns, sampled at ``rate`` (Hz); raises InputError."""
     axes, truth = {}, {}
-    for topic, own in columns:
+    for topic, own in topics:
         if topic.is_truth:
             truth[topic.axis] = own
             continue

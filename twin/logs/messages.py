@@ -65,13 +65,10 @@ def field_numbers(channel: Channel, schema: Schema | None) -> dict[str, int]:
     except DecodeError as error:
         raise InputError(f"the protobuf schema {schema.name!r} cannot be used") from error
     found = [m for f in files for m in f.message_type if f"{f.package}.{m.name}" == schema.name]
-    numbers = {
-        f.name: f.number
-        for message in found[:1]
-        for f in message.field
-        if f.type == Field.TYPE_DOUBLE and f.name.isidentifier() and f.number > 0
-    }
-    if not found or len(numbers) != len(found[0].field):
+    fields = found[0].field if found else ()
+    doubles = [f for f in fields if f.type == Field.TYPE_DOUBLE and f.name.isidentifier()]
+    numbers = {f.name: f.number for f in doubles if f.number > 0}
+    if not found or len(numbers) != len(fields):
         raise InputError(
             f"the protobuf schema {schema.name!r} is not of doubles alone; convert the log with: "
             "twin import"
