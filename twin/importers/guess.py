@@ -309,17 +309,14 @@ def guess_map(path: Path) -> Guess:
     lines, missing, used = [head, *clock], list[str](), {time}
     for axis, names in _axes(moving).items():
         found = signals_of(names, moving, step)
-        rotary = turns(found)
         lines += ["", f"[axes.{axis}]"]
-        lines += [
-            _entry(f, s, moving, rotary, found.get("position"), step) for f, s in found.items()
-        ]
+        lines += [_entry(field, found, moving, step) for field in found]
         for field in ("position", "force"):
             if field not in found and not (field == "force" and "current" in found):
                 missing.append(f"axis {axis}: no column of {', '.join(names)} looks like a {field}")
                 lines.append(f'# {field} = {{column = "?", unit = "?"}} # {missing[-1]}')
         if "current" in found and "force" not in found:
-            unit = "N m/A" if rotary else "N/A"
+            unit = "N m/A" if turns(found) else "N/A"
             lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
         used |= {*names, *(signal.name for signal in found.values())}
         unused = [n for n in names if n not in {signal.name for signal in found.values()}]
@@ -407,14 +404,12 @@ def _axes(columns: Columns) -> dict[str, list[str]]:
     return whole or {"x": list(columns)}
 
 
-def _entry(
-    field: str, signal: Signal, columns: Columns, rotary: bool,
-    position: Signal | None, step: float,
-) -> str:  # fmt: skip
+def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: float) -> str:
     """One line of the map, with the reason behind it."""
+    signal, position = found[field], found.get("position")
     column = columns[signal.name]
     span = f"{signal.reason}; {column.min():.4g} to {column.max():.4g}"
-    units = ROTARY_UNITS if rotary else LINEAR_UNITS
+    units = ROTARY_UNITS if turns(found) else LINEAR_UNITS
     if is_unit(signal.unit, units[field]):
         return f"{field} = {_table(signal.name, signal.unit)} # {span}"
     unit, why = assumed(units[field], column), ""

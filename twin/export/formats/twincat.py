@@ -38,10 +38,8 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
 def _held(of: AxisTables) -> AxisTables:
     """What TwinCAT has a place for: a speed table that turns with the direction, and cogging."""
     chosen, _ = fewest_points(of.speeds, of.odd, POINTS)
-    odd = of.odd[chosen]
-    return replace(
-        of, along=np.zeros_like(of.along), speeds=of.speeds[chosen], forwards=odd, backwards=-odd
-    )
+    still, speeds, odd = np.zeros_like(of.along), of.speeds[chosen], of.odd[chosen]
+    return replace(of, along=still, speeds=speeds, forwards=odd, backwards=-odd)
 
 
 def _points(axis: AxisModel, of: AxisTables) -> str:
