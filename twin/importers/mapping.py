@@ -214,13 +214,10 @@ class ImportMap(_File):
         return tuple(dict.fromkeys(c.scale for c in self.columns() if isinstance(c.scale, str)))
 
     def scaled_by(self, scalars: Mapping[str, float]) -> ImportMap:
-        """The same with these scalars in the scales that name them."""
-
-        def scaled(c: ColumnMap) -> ColumnMap:
-            named = isinstance(c.scale, str) and c.scale in scalars
-            return c.model_copy(update={"scale": scalars[str(c.scale)]}) if named else c
-
-        return self._changed(scaled)
+        """The same with these scalars, none of which is called as a number, in their scales."""
+        return self._changed(
+            lambda c: c.model_copy(update={"scale": scalars.get(str(c.scale), c.scale)})
+        )
 
     def _changed(self, change: Callable[[ColumnMap], ColumnMap | None], **other: Any) -> ImportMap:
         """The same with other columns, and other entries."""

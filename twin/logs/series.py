@@ -83,9 +83,11 @@ class Series:
 
     def taken(self) -> dict[str, Array]:
         """The samples that are held, of every field; from here on only new ones are."""
-        columns, held = self._columns, self.held
+        columns = self._columns
+        for name, column in columns.items():  # one by one, so that one alone is held twice
+            columns[name] = column if len(column) == self.held else column[: self.held].copy()
         self._columns, self.held = {}, 0
-        return {n: c if len(c) == held else c[:held].copy() for n, c in columns.items()}
+        return columns
 
 
 def require_even(topic: Topic, block: Block, sequence: int, start: int, count: int) -> None:
