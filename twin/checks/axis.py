@@ -152,8 +152,8 @@ class Axis:
 
     def lag_of(self, signal: Array, explained_by: Array) -> float:
         """Lag (s) of a signal (m,) behind its regressors (m, k); 0 where that is not clear."""
-        found = find_lag(signal, explained_by, self.kept, self.smoother.block)
-        return found.seconds if found.clear else 0.0
+        seconds, clear = find_lag(signal, explained_by, self.kept, self.smoother.block)
+        return seconds if clear else 0.0
 
     def trend(self, regressors: Array) -> Trend | None:
         """The same in each part of the log, beside some regressors of the command."""

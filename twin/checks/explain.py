@@ -136,18 +136,11 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dy
     return Dynamics(mass, explains, share, residual, first)
 
 
-@dataclass(frozen=True)
-class Lag:
-    """seconds: positive where the signal is late. clear: whether another lag fits much worse."""
+def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> tuple[float, bool]:
+    """Lag (s) of ``signal`` (n,) for which regressors (n, k) explain most, and if it is clear.
 
-    seconds: float
-    clear: bool
-
-
-def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> Lag:
-    """Lag of ``signal`` (n,) for which regressors (n, k) explain most of it by least squares.
-
-    kept: (n,) 1.0 where the regressors may be believed, else 0.0; block: s from sample to sample.
+    It is where another fits much worse. kept: (n,) 1.0 where the regressors may be believed, else
+    0.0; block: s from sample to sample.
     """
     reach = min(round(limits.LONGEST_LAG / block), len(signal) // limits.MOTION_OVER_LAG)
     inner = slice(reach, len(signal) - reach)
@@ -163,7 +156,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
     least = min(bottom.min(initial=np.inf), residual.min())  # the latter where it falls to an end
     good = (bottom <= limits.AS_GOOD_LAG**2 * least) | (bottom <= limits.WRONG_LAG**2 * total[dips])
     if not good.any():
-        return Lag(0.0, False)
+        return 0.0, False
     nearest = int(np.argmin(np.abs(dips[good] - reach)))  # a periodic motion has several
     best = int(dips[good][nearest])
     samples = float(best - reach + fraction[good][nearest])
@@ -173,7 +166,7 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> L
         and residual[best] < limits.BETTER_LAG**2 * residual[reach]
         and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
     )
-    return Lag(samples * block, bool(clear))
+    return samples * block, bool(clear)
 
 
 def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
@@ -202,8 +195,8 @@ def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) ->
     for first, last in pairwise(edges):
         part = slice(first, last)
         if kept[part].mean() > 0.5 and np.ptp(signal[part]) > limits.LIVELY_PART * np.ptp(signal):
-            lag = find_lag(signal[part], explained_by[part], kept[part], block)
-            found.append((0.5 * (first + last) * block, lag.seconds))
+            lag, _ = find_lag(signal[part], explained_by[part], kept[part], block)
+            found.append((0.5 * (first + last) * block, lag))
     if len(found) < limits.FEWEST_LAG_PARTS:
         return None
     times, lags = np.array(found).T
