@@ -24,29 +24,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Remark:
-    """What a format makes of a part of the model that it cannot hold as it is.
-
-    part: an effect, or another part of the axis such as "mass"; text: what becomes of it and why,
-    in one sentence with units.
-    """
+    """What a format makes of a part of the model that it cannot hold as it is."""
 
     axis: str
+    """The axis whose part it is."""
     part: str
+    """An effect, or another part of the axis such as "mass"."""
     text: str
+    """What becomes of it and why, in one sentence with units."""
 
 
 @dataclass(frozen=True)
 class Exported:
-    """The files of an export, and what they lack of the model.
-
-    files: content by name; kept: by axis, what they hold as the model does; approximated: what they
-    hold nearly; lost: what they do not hold.
-    """
+    """The files of an export, and what they lack of the model."""
 
     files: Mapping[str, str | bytes]
+    """Content by file name."""
     kept: Mapping[str, tuple[str, ...]]
+    """By axis, what the files hold as the model does."""
     approximated: tuple[Remark, ...] = ()
+    """What they hold nearly."""
     lost: tuple[Remark, ...] = ()
+    """What they do not hold."""
 
 
 Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]
@@ -54,15 +53,14 @@ Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]
 
 @dataclass(frozen=True)
 class Exporter:
-    """One format.
-
-    summary: what it writes, in a few words; export: (model, logs by name) -> files, which tells on
-    logs what is lost and raises InputError; ending: of the name of a file that every export has.
-    """
+    """One format."""
 
     summary: str
+    """What it writes, in a few words."""
     export: Export
+    """(model, logs by name) -> files; with logs it tells on them what is lost. Raises InputError"""
     ending: str
+    """Of the name of a file that every export has."""
 
 
 def format_names() -> tuple[str, ...]:
@@ -101,16 +99,14 @@ def identifier(name: str) -> str:
 
 @dataclass(frozen=True)
 class Outdated:
-    """A file that is not as the model gives it now.
-
-    line: the first that differs, None in a file that is no text; has, gives: that line of the file
-    and of the model, empty where one has ended.
-    """
+    """A file that is not as the model gives it now."""
 
     file: str
     line: int | None
+    """The first that differs; None in a file that is no text."""
     has: str
     gives: str
+    """The line of the file, and that of the model; empty where one has ended."""
 
 
 @dataclass(frozen=True)

@@ -35,11 +35,14 @@ EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses wh
 
 @dataclass(frozen=True, eq=False)
 class Periodic:
-    """The force (ENTRIES,) N, from position 0 on, that balances an effect of that period (m)."""
+    """The force that balances an effect which repeats along the track."""
 
     name: str
+    """Of the effect."""
     period: float
+    """m."""
     force: Array
+    """(ENTRIES,) N, from position 0 on."""
 
     def harmonics(self, least: float = 0.01) -> dict[int, complex]:
         """Harmonics of at least that part of the largest: cosine term - i sine term, N."""
@@ -51,20 +54,22 @@ class Periodic:
 
 @dataclass(frozen=True, eq=False)
 class AxisTables:
-    """The force that an axis needs, as a sum of tables.
-
-    mass: kg, times the acceleration. along: (n,) N at positions (n,) m, the same in both
-    directions. forwards, backwards: (k,) N at speeds (k,) m/s from 0 on, added while the axis moves
-    that way, backwards negative for a friction. periodic: what repeats along the track.
-    """
+    """The force that an axis needs, as a sum of tables."""
 
     mass: float
+    """kg, times the acceleration."""
     positions: Array
+    """(n,) m."""
     along: Array
+    """(n,) N, the same in both directions."""
     speeds: Array
+    """(k,) m/s, from 0 on."""
     forwards: Array
+    """(k,) N, added while the axis moves forwards."""
     backwards: Array
+    """(k,) N, added while it moves backwards: negative for a friction."""
     periodic: tuple[Periodic, ...]
+    """What repeats along the track."""
 
     def force(self, motion: Array) -> Array:
         """Force (n,) N along a motion (3, n): position m, velocity m/s, acceleration m/s^2."""
@@ -85,11 +90,13 @@ class AxisTables:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion on which losses are told, period s; setpoints: by axis (3, n) in m, m/s, m/s^2."""
+    """A motion on which losses are told."""
 
     name: str
     period: float
+    """s."""
     setpoints: Mapping[str, Array]
+    """By axis (3, n): position m, velocity m/s, acceleration m/s^2."""
 
 
 def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
