@@ -15,6 +15,14 @@ from twin.effect import OUT, Effect, Excitation
 
 FREE = next(e for e in CATALOGUE.values() if e.free_shape)
 COVERED = Excitation(-0.1, 0.2, 0.25, 0.3, 10.0, 1e-3)
+OVER = pytest.mark.parametrize(
+    ("over", "period", "ends"),
+    [
+        (Coordinate.POSITION, None, (-0.1, 0.2)),
+        (Coordinate.POSITION, 0.034, (0.0, 0.034)),
+        (Coordinate.SPEED, None, (0.0, 0.25)),
+    ],
+)
 CURVED = [(e, c) for e in CATALOGUE.values() for c in e.curves]
 
 
@@ -23,11 +31,8 @@ def laid(curve: Curve, period: float | None = None, *, lets_go: bool = False) ->
 
 
 @pytest.mark.parametrize("lets_go", [False, True])
-@pytest.mark.parametrize(
-    ("over", "period"),
-    [(Coordinate.POSITION, None), (Coordinate.POSITION, 0.034), (Coordinate.SPEED, None)],
-)
-def test_it_is_its_equation_over_every_coordinate(over, period, lets_go) -> None:
+@OVER
+def test_it_is_its_equation_over_every_coordinate(over, period, ends, lets_go) -> None:
     values = laid(Curve(over, by_direction=True), period, lets_go=lets_go)
     q = columns(0.5, friction=False)
     _, after = stepped(FREE, values, q)
@@ -35,14 +40,7 @@ def test_it_is_its_equation_over_every_coordinate(over, period, lets_go) -> None
     np.testing.assert_allclose(after[:, OUT], wanted, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("over", "period", "ends"),
-    [
-        (Coordinate.POSITION, None, (-0.1, 0.2)),
-        (Coordinate.POSITION, 0.034, (0.0, 0.034)),
-        (Coordinate.SPEED, None, (0.0, 0.25)),
-    ],
-)
+@OVER
 def test_its_knots_are_where_the_law_has_them(over, period, ends) -> None:
     """At a knot, moving for long, the force is that of the knot, both ways."""
     values = laid(Curve(over, by_direction=True), period)

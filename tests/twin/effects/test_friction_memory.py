@@ -20,8 +20,6 @@ def test_an_inner_loop_closes_and_leaves_no_trace(name: str) -> None:
     assert with_loops == pytest.approx(straight, abs=1e-3)
 
 
-# --- the stack of the Leuven model ----------------------------------------------------------------
-
 SHARP = {"Fc": 1.5, "Fs": 1.5, "b": 1.5, "m": 50.0}  # z follows x but close to sliding
 TURNS = 16  # that the stack holds
 
@@ -61,7 +59,7 @@ def test_leuven_follows_madelungs_rules() -> None:
     np.testing.assert_allclose(found, madelung(turns), atol=2e-4)
 
 
-@pytest.mark.parametrize("turns", [10, 16, 40])
+@pytest.mark.parametrize("turns", [16, 40])
 def test_leuvens_stack_drops_the_smallest_loops_when_it_is_full(turns: int) -> None:
     found = at_turns(friction("leuven", **SHARP), spiral(turns), leg=200)
     kept = min(turns, TURNS)
@@ -76,7 +74,7 @@ def test_leuvens_loops_close_nearly_where_large_ones_had_to_be_dropped() -> None
     assert abs(found[-1] - found[0]) < 0.1 * np.ptp(found[-3:-1])
 
 
-@pytest.mark.parametrize(("turns", "least", "most"), [(10, 9, 9), (17, 16, 16), (40, 14, 16)])
+@pytest.mark.parametrize(("turns", "least", "most"), [(10, 9, 9), (40, 14, 16)])
 def test_leuvens_stack_is_bounded(turns: int, least: int, most: int) -> None:
     leuven = friction("leuven", **SHARP)
     v = np.repeat([1e-4 * (1.0 - i / 60) * (-1) ** i for i in range(turns)], 10)

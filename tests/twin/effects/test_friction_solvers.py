@@ -25,10 +25,10 @@ def rms(a: Array) -> float:
 
 @pytest.mark.parametrize(
     ("p", "mass", "spring", "speed", "duration", "slips"),
-    [(STAGE, 1.0, 5.0, 0.005, 4.0, 0), (STIFF, 1.0, 30.0, 0.05, 4.0, 3),
+    [(STAGE, 1.0, 5.0, 0.005, 4.0, 0),
      (STIFF, 1.0, 2.0, 0.1, 16.0, 2),  # stick-slip of the 1995 paper, by the same reconstruction
      (SOFT, 0.5, 50.0, 0.02, 3.0, 4)],
-    ids=["stage", "stiff", "paper", "soft"],
+    ids=["stage", "paper", "soft"],
 )  # fmt: skip
 def test_lugre_converges_to_the_stiff_solver_on_a_mass_pulled_by_a_spring(
     p: dict[str, float], mass: float, spring: float, speed: float, duration: float, slips: int
@@ -68,9 +68,9 @@ def mujoco_slide(dt: float, inside: str, elements: str) -> tuple[mujoco.MjModel,
     return model, mujoco.MjData(model)
 
 
-@pytest.mark.parametrize("dt", [1e-3, 1e-4])
-def test_gms_with_a_constant_level_is_mujocos_bundle_of_plastic_springs(dt: float) -> None:
+def test_gms_with_a_constant_level_is_mujocos_bundle_of_plastic_springs() -> None:
     """Maxwell-slip elements as tendons that yield: springyield = a_i g/k_i."""
+    dt = 1e-3
     springs = 40.0 ** (-np.arange(5) / 4)
     springs *= 1e5 / springs.sum()
     tendons = "".join(

@@ -85,9 +85,6 @@ def test_an_end_stop_ends_a_travel_and_pushes(
     assert CATALOGUE["end_stop"].is_itself(values, COVERED) is itself
 
 
-# --- the declaration itself ----------------------------------------------------------------------
-
-
 def law(p, s, io):
     io[0] = io[V]
 
@@ -100,20 +97,12 @@ def number(name: str, start: float, low: float, high: float, **how: object) -> P
     return Parameter(name, "N", start, low, high, "m", **how)
 
 
-@pytest.mark.parametrize("start", [-2.0, 0.5, 3.0])
-def test_a_start_on_or_within_its_bounds_is_allowed(start: float) -> None:
-    assert declared(number("a", start, -2.0, 3.0)).starts() == {"a": start}
-
-
 BAD = {
     "start below": (number("a", -2.1, -2.0, 3.0),),
-    "start above": (number("a", 3.1, -2.0, 3.0),),
     "never absent above": (number("a", 1.0, 0.5, 3.0, strength=True),),
-    "never absent below": (number("a", -1.0, -3.0, -0.5, strength=True),),
     "twice": (number("a", 1.0, 0.0, 3.0), number("a", 1.0, 0.0, 3.0)),
     "unknown floor": (number("a", 1.0, 0.0, 3.0, at_least="b"),),
     "no unit": (Parameter("a", "", 1.0, 0.0, 3.0, "m"),),
-    "number for a unit": (Parameter("a", 1.0, 1.0, 0.0, 3.0, "m"),),  # type: ignore[arg-type]
 }
 
 

@@ -153,10 +153,8 @@ TOLERANCES = {
     1e-4: {"dahl": 1e-5, "lugre": 1e-5, "gms": 5e-5, "leuven": 1e-2, "modified_leuven": 2e-2},
     1e-5: {"dahl": 1e-7, "lugre": 1e-6, "gms": 1e-6, "leuven": 1e-3, "modified_leuven": 1e-3},
 }
-CASES = [
-    *((n, 1e-4, when) for n in REFERENCES for when in (1.0, 0.5)),
-    *((n, 1e-5, 0.5) for n in TOLERANCES[1e-5]),
-]
+CASES = [(n, 1e-4, when) for n in REFERENCES for when in (1.0, 0.5)]
+CASES += [(n, 1e-5, 1.0) for n in TOLERANCES[1e-5]]
 
 
 @pytest.mark.parametrize(("name", "dt", "when"), CASES)

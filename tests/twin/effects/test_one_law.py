@@ -62,11 +62,6 @@ def test_gravity_is_offered_where_the_axis_turns() -> None:
     assert "constant_force" in offered(BARE), "the weight of a tilted slide"
 
 
-def test_what_is_not_offered_may_be_given() -> None:
-    axis = having("coulomb_viscous", "spring", "cable_slab", "viscous_friction", "gravity")
-    assert len(axis.effects) == 5
-
-
 def test_the_stage_with_a_cable_keeps_its_names() -> None:
     stage = load_model("proton_xy", CATALOGUE)
     for axis in stage.axes.values():

@@ -85,8 +85,6 @@ def test_a_scan_is_sorted_within_bounds_and_in_the_units_of_the_log(name: str) -
         assert follows_units(p.scan, p.unit)
 
 
-# --- starts and scans that are known --------------------------------------------------------------
-
 MEANT = {
     "Fc": LOG.dry_level, "start": LOG.position_low, "low": LOG.position_low,
     "high": LOG.position_high, "length": LOG.travel, "speed": LOG.speed_max,
@@ -114,8 +112,9 @@ def scan(effect: str, name: str, e: Excitation = LOG) -> np.ndarray:
     return np.array(CATALOGUE[effect].parameter(name).scan(e))
 
 
-@pytest.mark.parametrize(("effect", "most"), [("cogging", 120), ("force_constant_ripple", 70)])
-@pytest.mark.parametrize("travel", [0.02, 0.4])
+@pytest.mark.parametrize(
+    ("effect", "most", "travel"), [("cogging", 120, 0.02), ("force_constant_ripple", 70, 0.4)]
+)
 def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(
     effect: str, most: int, travel: float
 ) -> None:
@@ -157,8 +156,7 @@ def force(effect: Effect, values: dict[str, float], x: float) -> float:
     return io[OUT]
 
 
-@pytest.mark.parametrize("k", [1, 2, 3])
-@pytest.mark.parametrize("others", [0.0, 0.09, 0.11])
+@pytest.mark.parametrize(("k", "others"), [(1, 0.0), (2, 0.09), (2, 0.11), (3, 0.0)])
 def test_the_simplest_pitch_has_the_same_force(k: int, others: float) -> None:
     """A harmonic alone is a fundamental of a part of the pitch; less than a tenth is left out."""
     effect = CATALOGUE["cogging"]

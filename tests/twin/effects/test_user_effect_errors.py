@@ -15,34 +15,26 @@ STRENGTH = '"N/m", 0.0, -1e5, 1e5, "stiffness at the place"'
 FAULTS = {
     "unit left empty": (STRENGTH, STRENGTH.replace("N/m", ""), "has no unit"),
     "unit forgotten": (STRENGTH, STRENGTH.replace('"N/m", ', ""), "name, unit, start, lower"),
-    "unit is a number": ('"N/m"', "3.0", "give a text such as 'N'"),
-    "bound forgotten": (STRENGTH, STRENGTH.replace(", 1e5", ""), "name, unit, start, lower"),
     "start outside": (STRENGTH, STRENGTH.replace("0.0", "2e5"), "outside its bounds"),
-    "bounds swapped": (STRENGTH, STRENGTH.replace("-1e5, 1e5", "1e5, -1e5"), "outside its bounds"),
-    "state not declared": (LAW_END, f"s[0] = distance\n    {LAW_END}", "s[0], but 0 states"),
     "one state too few": (
         "    law=law,", '    law=law,\n    states=("own",),', "s[1], but 1 states",
     ),
     "negative index": (LAW_END, LAW_END.replace("p[0]", "p[-1]"), "p[-1], but 3 parameters"),
     "io too far": (LAW_END, LAW_END.replace("io[OUT]", "io[99]"), "io[99], but it has"),
     "nothing at v = 0": (LAW_END, "io[OUT] = p[0] / io[V]", "no finite number at v = 0 m/s"),
-    "nan at v = 0": (LAW_END, "io[OUT] = io[V] * 1e400 - p[0]", "no finite number at v = 0 m/s"),
     "domain": (LAW_END, "io[OUT] = p[0] * sqrt(io[V])", "no finite number at v = -1e-06 m/s"),
     "no result": (LAW_END, "distance = ratio", "its law writes no result; a force effect writes"),
     "not compiled": (LAW_END, 'io[OUT] = float("%g" % p[0])', "cannot be compiled"),
-    "index by position": (LAW_END, f"{LAW_END} + s[int(io[X] > 0.5) - 1]", "s[-1], but 0 states"),
     "index far away": (LAW_END, f"{LAW_END} + (p[int(io[X])] if io[X] > 3.0 else 0.0)", "at x = "),
     "exit": ("EFFECT = ", "import sys\nsys.exit(0)\nEFFECT = ", "ended the program while it was"),
-    "hard exit": ("EFFECT = ", "import os\nos._exit(0)\nEFFECT = ", "ended the program while it"),
     "crash": ("EFFECT = ", "import ctypes\nctypes.string_at(0)\nEFFECT = ", "crashed .*SIGSEGV"),
-    "loop": ("EFFECT = ", "while True:\n    pass\nEFFECT = ", "a loop without an end"),
     "loop in the law": (LAW_END, f"while io[V] > 0.05:\n        pass\n    {LAW_END}", "a loop"),
     "hunger": ("EFFECT = ", "bytearray(1 << 33)\nEFFECT = ", "as an effect: MemoryError"),
     "unknown name": (LAW_END, "io[OUT] = missing", "name 'missing' is not defined"),
 }  # fmt: skip
 
 
-ENDLESS = ("loop", "loop in the law")  # ended after half a minute
+ENDLESS = ("loop in the law",)  # ended after half a minute
 
 
 @pytest.mark.parametrize(
@@ -81,8 +73,3 @@ def test_the_name_of_another_effect_is_refused(name: str, times: int, tmp_path: 
     path.write_text(SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(InputError, match=f"there is an effect '{name}' already; give the file"):
         load_catalogue([path] * times)
-
-
-def test_the_help_says_that_loading_runs_code() -> None:
-    done = twin("effects", "--help", folder=Path.cwd())
-    assert "loading it runs its code" in " ".join(done.stdout.split())

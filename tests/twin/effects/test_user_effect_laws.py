@@ -11,19 +11,9 @@ from twin.laws.verdict import LAWS
 SOURCE = Path(__file__).parents[3] / "examples" / "my_effect.py"
 LAW_END = "io[OUT] = -p[0] * distance * exp(-ratio * ratio)"
 FAULTS = {
-    "force at zero strength": (
-        LAW_END, f"{LAW_END} - 0.25", "changes nothing at zero strength", "a force of 0.25 N",
-    ),
-    "not a number at a bound": (
-        LAW_END, f"{LAW_END} + 0.0 * p[0] / (1e5 - p[0])",
-        "is finite at every bound", "with k = 100000 N/m",
-    ),
     "a state that is not declared": (
         LAW_END, f"{LAW_END} + (p[0] * s[0] if p[0] > 9e4 else 0.0)",
         "uses only what it declares", "s[0], but 0 states are declared",
-    ),
-    "a write to what is not its own": (
-        LAW_END, f"{LAW_END}\n    io[X] += 1e-9", "writes only its result", "writes io[X]",
     ),
     "a wrong unit": (
         '"k", "N/m",', '"k", "N",', "is the same in other units",
@@ -109,23 +99,22 @@ def law(p, s, io):
 
 EFFECT = Effect(
     kind=Kind.FORCE, summary="eddy current brake", equation="{equation}", source="a test",
-    parameters=(Parameter("c", "{unit}", 0.0, 0.0, 1e6, "braking", strength=True),),
+    parameters=(Parameter("c", "N s/m", 0.0, 0.0, 1e6, "braking", strength=True),),
     law=law, fingerprint="grows with speed", excited_by="fast passes",
 )
 """
 SPEED = {
-    "equation in words": ("-", "a brake in proportion to speed", "N s/m", None),
-    "sign, equation in words": ("", "a brake in proportion to speed", "N s/m", "gives no energy"),
-    "sign in both": ("", "F = c v", "N s/m", "gives no energy"),
-    "unit": ("-", "F = -c v", "N/m", "is the same in other units"),
+    "equation in words": ("-", "a brake in proportion to speed", None),
+    "sign, equation in words": ("", "a brake in proportion to speed", "gives no energy"),
+    "sign in both": ("", "F = c v", "gives no energy"),
 }
 
 
 @pytest.mark.parametrize("case", SPEED)
-def test_a_brake_that_drives_or_has_another_unit_is_found(case: str, tmp_path: Path) -> None:
-    sign, equation, unit, law = SPEED[case]
+def test_a_brake_that_drives_is_found(case: str, tmp_path: Path) -> None:
+    sign, equation, law = SPEED[case]
     path = tmp_path / "brake.py"
-    path.write_text(DRAG.format(sign=sign, equation=equation, unit=unit), encoding="utf-8")
+    path.write_text(DRAG.format(sign=sign, equation=equation), encoding="utf-8")
     done = twin("effects", "brake", "--effects", path, "--check", folder=tmp_path)
     failed = [line for line in done.stdout.splitlines() if "FAILED" in line]
     assert done.returncode == (law is not None), done.stdout + done.stderr
