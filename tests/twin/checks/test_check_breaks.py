@@ -6,7 +6,6 @@ from check_drive import axis_of, drive, findings, motion, stated
 
 from twin.checks import Fault, Severity, check_log
 from twin.checks.axis import held_samples
-from twin.checks.command import off_course
 from twin.checks.explain import find_trend
 from twin.logs import AxisLog, Log
 
@@ -107,14 +106,6 @@ def test_a_counter_that_wraps_goes_back_by_most_of_the_travel(signals):
     assert found.where.endswith(f" and {wraps - 1} more times")
 
 
-def test_logs_that_were_joined_differ_in_place_and_speed():
-    def change(columns):
-        columns["position"][2000:] = 0.3 - 2.0 * motion(10.47 + np.arange(2000) / RATE)
-
-    (found,) = broken(change)
-    assert (found.fault, found.where) == (Fault.JOINED, "1.999 to 2 s")
-
-
 @pytest.mark.parametrize(
     ("part", "fault", "words", "severity"),
     [(0.7, Fault.UNEVEN, "off by ", Severity.WARNING),
@@ -153,7 +144,7 @@ def test_from_twelve_places_and_one_a_second_on_it_is_the_clock(count, seconds, 
 # Held values, and what is beside them
 
 
-@pytest.mark.parametrize("count", [2, 5, 20])
+@pytest.mark.parametrize("count", [2, 20])
 def test_a_signal_that_is_held_changes_at_every_few_samples(count):
     signal = np.sin(0.01 * np.arange(4000.0))
     assert held_samples(signal) == 0
@@ -173,13 +164,6 @@ def test_a_held_signal_is_told_with_the_rate_it_was_sampled_at(name):
     assert found.what.startswith(f"the {name} changes at every 4th sample only")
     assert found.what.endswith("it was sampled at 250 Hz and held")
     assert found.remedy == "record it at 1000 Hz, or the log at 250 Hz"
-
-
-def test_a_sample_is_off_the_median_of_five():
-    signal = np.random.default_rng(8).standard_normal(200)
-    wanted = [abs(signal[k] - np.median(signal[k - 2 : k + 3])) for k in range(2, 198)]
-    np.testing.assert_allclose(off_course(signal), [0.0, 0.0, *wanted, 0.0, 0.0])
-    assert not off_course(signal[:5]).any()
 
 
 @pytest.mark.parametrize(("parts", "enough"), [(4, False), (5, True)])

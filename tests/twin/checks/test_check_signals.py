@@ -1,7 +1,7 @@
 """Laws of the low-pass, the lag and the rough dynamics that the checks of a log rest on.
 
-Polynomials pass a symmetric low-pass in closed form; the noise of a linear map is the norm of one
-of its rows; a lag that is put in is the lag that is found.
+The noise of a linear map is the norm of one of its rows; a lag that is put in is the lag that is
+found. What the low-pass gives is seen by the sizes that the checks state.
 """
 
 import numpy as np
@@ -10,27 +10,6 @@ import pytest
 from twin.checks.explain import Smoother, find_lag, fit_dynamics
 
 KEPT = np.ones(6000)
-
-
-@pytest.mark.parametrize("rate", [200.0, 1000.0, 1500.0, 4000.0])
-def test_lines_and_parabolas_pass_in_closed_form(rate):
-    """x = a + b t + c t^2: position a + b t, velocity b + 2 c t, acceleration 2 c, at time()."""
-    smoother = Smoother(1.0 / rate)
-    t = np.arange(round(0.5 * rate) + 3) / rate
-    a, b, c = 0.3, -1.7, 2.9
-    line, parabola = a + b * t, a + b * t + c * t**2
-    at = smoother.time(np.arange(len(smoother.position(line))))
-    for found, wanted in (
-        (smoother.position(line), a + b * at),
-        (smoother.velocity(parabola), b + 2.0 * c * at),
-        (smoother.acceleration(parabola)[1:-1], np.full(len(at) - 2, 2.0 * c)),
-        # a held signal acts from its sample on: over a block its mean is half a sample early
-        (smoother.held(line), a + b * (at - 0.5 / rate)),
-        (smoother.rate(line), a + b * at),
-        (smoother.direction(b * t, 0.1), np.full(len(at), np.tanh(b / 0.1))),
-    ):
-        assert len(found) == len(wanted)
-        np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [200.0, 1500.0])
@@ -61,8 +40,9 @@ def signals(lag_blocks: float, noise: float = 0.0):
     return signal + noise * np.random.default_rng(6).standard_normal(len(k)), motion(k)
 
 
-@pytest.mark.parametrize("lag", [-200.0, -30.5, -1.0, -0.3, 0.0, 2.25, 17.0, 150.0])
-@pytest.mark.parametrize("block", [1e-3, 5e-4])
+@pytest.mark.parametrize(
+    ("lag", "block"), [(-200.0, 1e-3), (-30.5, 5e-4), (-0.3, 1e-3), (1.0, 1e-3), (150.0, 5e-4)]
+)
 def test_the_lag_put_in_is_the_lag_found_to_a_tenth_of_a_block(lag, block):
     signal, regressors = signals(lag)
     seconds, clear = find_lag(signal, regressors, KEPT, block)
@@ -111,23 +91,13 @@ def test_a_lag_is_clear_where_it_explains_much_and_much_more_than_none(angle, no
         assert seconds == pytest.approx(angle / 0.05 * 1e-3, abs=2e-5)
 
 
-@pytest.mark.parametrize("late", [-1.5, -0.5, 0.4, 1.5, 2.5])
-@pytest.mark.parametrize("speed", [0.031, 0.083])
+@pytest.mark.parametrize(("late", "speed"), [(-1.5, 0.031), (0.4, 0.083), (2.5, 0.031)])
 def test_a_sine_is_late_by_the_least_that_explains_it_though_half_a_period_does_too(late, speed):
     """Between two samples neither of them is exact, where half a period later one may be."""
     k = np.arange(4000.0)
     signal = np.sin(speed * (k - late)) + 1e-3 * np.random.default_rng(2).standard_normal(4000)
     seconds, _ = find_lag(signal, np.sin(speed * k)[:, None], np.ones(4000), 1e-3)
     assert seconds == pytest.approx(late * 1e-3, abs=2e-5)
-
-
-def test_samples_that_are_not_kept_do_not_tell():
-    signal, regressors = signals(25.0)
-    kept = KEPT.copy()
-    regressors[2000:2300] += 50.0
-    kept[2000:2300] = 0.0
-    found = find_lag(signal, regressors, kept, 1e-3)
-    assert found == (pytest.approx(0.025, abs=1e-4), True)
 
 
 def motion_and_force(noise: float, mass: float = 3.5):
@@ -138,19 +108,6 @@ def motion_and_force(noise: float, mass: float = 3.5):
     clean = regressors @ np.array([mass, 1.2, 2.0, -0.7])
     white = np.random.default_rng(7).standard_normal(2000)
     return regressors, clean + noise * np.std(clean) * white
-
-
-def test_gains_are_those_put_in_whatever_a_few_samples_say():
-    regressors, force = motion_and_force(0.0)
-    force[700:720] += 500.0  # one in a hundred, trimmed
-    force[100:130] = np.nan_to_num(np.inf)
-    kept = np.ones(2000)
-    kept[100:130] = 0.0
-    fit = fit_dynamics(force, regressors, kept, 11)
-    assert (fit.mass, fit.first) == (pytest.approx(3.5, rel=1e-9), 11)
-    np.testing.assert_allclose(fit.residual[700:720], 500.0, rtol=1e-6)
-    assert fit_dynamics(-force, regressors, kept, 0).mass == pytest.approx(-3.5, rel=1e-9)
-    assert fit_dynamics(force[:90], 0.0 * regressors[:90], kept[:90], 0).mass == 0.0
 
 
 @pytest.mark.parametrize(

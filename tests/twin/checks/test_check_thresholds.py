@@ -68,11 +68,11 @@ def disturbed(offset: float, shape: Array):
     return make
 
 
-def at_speed(velocity: Array, units=LINEAR_UNITS) -> Log:
+def at_speed(velocity: Array) -> Log:
     """A drive without noise that moves at this velocity."""
     position = np.concatenate([[0.0], np.cumsum(velocity)[:-1]]) / 1e3
     force = 2.0 * np.gradient(velocity) * 1e3 + 3.0 * np.tanh(velocity / 1e-3)
-    return Log(1000.0, {"x": AxisLog({"position": position, "force": force}, units)})
+    return Log(1000.0, {"x": AxisLog({"position": position, "force": force})})
 
 
 def back_for(sign: float):
@@ -96,15 +96,11 @@ def slow(mass: float) -> Log:
     return Log(1e3, {"x": AxisLog({"position": position + noise, "force": force})})
 
 
-def spread(units):
+def spread(part: float) -> Log:
     """Triangles of speed around 0.2 m/s, both ways: nine tenths less one are 0.8 of the spread."""
-
-    def make(part: float) -> Log:
-        wave = 2.0 * np.abs((T * 0.7) % 1.0 - 0.5) - 0.5  # even from -1/2 to 1/2
-        speed = 0.2 * (1.0 + part / 0.8 * wave)
-        return at_speed(np.where((T // 1.5) % 2 == 0, speed, -speed), units)
-
-    return make
+    wave = 2.0 * np.abs((T * 0.7) % 1.0 - 0.5) - 0.5  # even from -1/2 to 1/2
+    speed = 0.2 * (1.0 + part / 0.8 * wave)
+    return at_speed(np.where((T // 1.5) % 2 == 0, speed, -speed))
 
 
 def moving(share: float) -> Log:
@@ -130,13 +126,13 @@ def held_at(rate: float, sign: float, fewest: int):
     return make
 
 
-def level(samples: int, sign: float = 1.0, droop: float = 0.0) -> Log:
+def level(samples: int, droop: float = 0.0) -> Log:
     """A command that is held for some ms, but for noise and a droop of so much noise."""
     down = droop * axis_of(drive()).smoother.held_noise(1e-3)
 
     def change(columns: dict[str, Array]) -> None:
         ramp = np.linspace(0.0, down, samples)
-        columns["force"][1500 : 1500 + samples] = sign * 30.0 - ramp
+        columns["force"][1500 : 1500 + samples] = 30.0 - ramp
         columns["force"] += 1e-3 * WHITE[:4000]
 
     return drive(change=change)
@@ -207,29 +203,23 @@ CASES = {
     # nine tenths of normal noise stay below 1.28 of its rms, which adds to the speed
     "a speed in its noise": Case(lambda times: noisy(times * SLOWEST * T), [4.2], 3.3,
                                  Fault.WEAK_EXCITATION, "the axis hardly moves"),
-    "a way in its noise": Case(lambda size: noisy(size * np.sin(100.0 * T)), [7e-6], 2e-6,
-                               Fault.WEAK_EXCITATION, "the axis hardly moves"),
     "forwards": Case(back_for(1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                      "the axis moves only forwards (", 98.5),
     "backwards": Case(back_for(-1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                       "the axis moves only backwards (", 98.5),
     "slow": Case(slow, [1.6], 0.8, Fault.WEAK_EXCITATION, "the mass cannot be identified"),
-    "one speed": Case(spread(LINEAR_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
+    "one speed": Case(spread, [0.06], 0.04, Fault.WEAK_EXCITATION,
                       "there is one speed only, 0.2 m/s, "),
-    "one rotary speed": Case(spread(ROTARY_UNITS), [0.06], 0.04, Fault.WEAK_EXCITATION,
-                             "there is one speed only, 0.2 rad/s, "),
     "too short": Case(lambda s: drive(seconds=s), [0.5, 0.501], 0.499, Fault.TOO_SHORT,
                       "the log lasts 0.499 s, a fit needs 0.5 s", severity=ERROR),
     **{f"at {31 * sign:g} N, {rate:g} Hz": Case(
         held_at(rate, sign, fewest), [fewest - 1], fewest, Fault.SATURATION,
         f"at its extreme of {31 * sign:g} N for {2 * fewest / rate:.3g} s in all", None,
         f"from {700 / rate:.6g} s")
-       for rate, fewest in ((500.0, 5), (1000.0, 5), (3000.0, 15)) for sign in (1.0, -1.0)},
+       for rate, fewest, sign in ((500.0, 5, 1.0), (3000.0, 15, -1.0))},
     # half a low-pass is lost at each end
     "a level": Case(level, [12], 60, Fault.SATURATION, "extreme of 30 N for ", 0.04, (1.51,)),
-    "a negative level": Case(lambda n: level(n, -1.0), [12], 60, Fault.SATURATION,
-                             "extreme of -30 N for ", 0.04, (1.51,)),
-    "a slow top": Case(lambda d: level(80, 1.0, d), [25.0], 3.0, Fault.SATURATION, "extreme of 30"),
+    "a slow top": Case(lambda d: level(80, d), [25.0], 3.0, Fault.SATURATION, "extreme of 30"),
     "a drive that is off": Case(off_below, [0.0], 0.25, Fault.SATURATION, "extreme of 0.25 N"),
     **{f"travel of {name}": Case(
         travelling(name), [(9.9, LINEAR_UNITS), (10.1, ROTARY_UNITS)], (10.1, LINEAR_UNITS),
@@ -267,16 +257,6 @@ def test_a_fault_is_told_from_its_threshold_on_with_place_and_size(name):
     else:
         places = [float(word) for word in told.where.split() if word[0].isdigit()]
         assert places[: len(case.where)] == pytest.approx(case.where, abs=0.012)
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_a_jump_is_possible_up_to_what_acceleration_and_noise_explain(noise):
-    """Four times the usual acceleration over a sample, and ten times the noise of a bend."""
-    axis = axis_of(added("position", slice(None), WHITE[:4000])(noise))
-    usual = np.quantile(np.abs(axis.acceleration), 0.99) / 1e6
-    bend = 6**0.5 * max(noise, axis.position_step / 12**0.5)
-    assert axis.possible_jump == pytest.approx(4.0 * usual + 10.0 * bend, rel=0.06)
-    assert not axis.jumps.any()
 
 
 @pytest.mark.parametrize(("apart", "where"), [(40, "2 to 2.1 s"), (70, "2 to 2.03 s and 1 more")])

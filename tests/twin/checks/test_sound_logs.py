@@ -5,7 +5,9 @@ Beside each of these machines the fault that it looks like is still found.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +22,6 @@ from twin.logs.log import Array
 
 EMPS_MAP = Path(__file__).parents[3] / "examples" / "import_emps.toml"
 
-# The twin and a public drive
-
 
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in range(1, 5))]
@@ -35,7 +35,7 @@ def test_experiments_of_both_axes_are_clean(experiment: str) -> None:
     assert check_log(simulate(stage(), experiment, seed=1, duration=10.0)).findings == ()
 
 
-@pytest.mark.parametrize("experiment", ["cable_pass", "velocity_map", "reversals"])
+@pytest.mark.parametrize("experiment", ["cable_pass", "reversals"])
 def test_experiments_of_one_axis_have_no_errors(experiment: str) -> None:
     report = check_log(simulate(stage(), experiment, duration=10.0))
     assert report.ok
@@ -45,7 +45,7 @@ def test_experiments_of_one_axis_have_no_errors(experiment: str) -> None:
     assert "hardly moves" in idle[0].what
 
 
-@pytest.mark.parametrize("rate", [5000.0, 1000.0, 200.0])
+@pytest.mark.parametrize("rate", [1000.0, 200.0])
 def test_a_slower_log_is_clean(rate: float) -> None:
     clean = clean_log()
     every = round(clean.sample_rate / rate)
@@ -62,16 +62,6 @@ def test_the_emps_drive_is_clean(shared_data: Path, file: str) -> None:
     assert check_log(import_log(shared_data / "emps" / file, load_mapping(EMPS_MAP))).findings == ()
 
 
-def test_a_drive_at_its_limit() -> None:
-    """The current is measured, so its noise rides on the limit."""
-    axis = stage().axes["y"]
-    weak = stage().with_axis("y", replace(axis, hardware=replace(axis.hardware, force_limit=9.0)))
-    report = check_log(simulate(weak, "moves", seed=3, duration=10.0))
-    found = [f for f in report.findings if f.fault is Fault.SATURATION]
-    assert {f.axis for f in found} == {"y"}
-    assert all("extreme of 9.0" in f.what or "extreme of -9.0" in f.what for f in found)
-
-
 # True machines of a few lines: a soft loop, friction with a memory, one count
 
 RATE, FINER = 1000.0, 10  # Hz, of the loop; steps of the integration a sample
@@ -80,8 +70,9 @@ COUNT = 2.0 * np.pi / 4096  # rad
 Elements = tuple[tuple[float, float], ...]
 
 
+@cache
 def joint(
-    goal: Array,
+    motion: Callable[[], Array],
     gain: float,
     damping: float,
     *,
@@ -89,12 +80,12 @@ def joint(
     elements: Elements = ((50.0, 0.05),),
     count: float = 0.0,
 ) -> tuple[Array, Array]:
-    """Position (n,) rad and torque (n,) N m of a joint whose P loop with damping follows a goal.
+    """Position (n,) rad and torque (n,) N m of a joint whose P loop with damping follows a motion.
 
     gain: N m/rad. elements: stiffness N m/rad and strength N m of springs that slip (W. D. Iwan,
     J. Appl. Mech. 33, 1966), its friction. count: rad, to which the reading is rounded.
     """
-    rng, dt = np.random.default_rng(1), 1.0 / RATE / FINER
+    rng, dt, goal = np.random.default_rng(1), 1.0 / RATE / FINER, motion()
     reading, torque = np.empty(len(goal)), np.empty(len(goal))
     q, v, held = float(goal[0]), 0.0, [0.0] * len(elements)
     for k, wanted in enumerate(goal.tolist()):
@@ -122,23 +113,23 @@ def waves(size: float, slow: float, fast: float, seconds: float = 8.0) -> Array:
     return size * (np.sin(2.0 * np.pi * slow * t + 0.3) + 0.5 * np.sin(2.0 * np.pi * fast * t))
 
 
-SWING = waves(0.6, 0.23, 0.61)
+def swing() -> Array:
+    return waves(0.6, 0.23, 0.61)
 
 
-@pytest.mark.parametrize("gain", [1.0, 2.0])
-def test_a_soft_loop_under_gravity_has_no_wrong_scale(gain: float) -> None:
-    """It reaches a fifth, or a third, of where it should be, and the torque says why."""
-    found = joint(SWING, gain, 0.15, gravity=4.0)
+SWING = swing()
+
+
+def test_a_soft_loop_under_gravity_has_no_wrong_scale() -> None:
+    """It reaches a fifth of where it should be, and the torque says why."""
+    found = joint(swing, 1.0, 0.15, gravity=4.0)
     assert np.std(found[0]) < 0.4 * np.std(SWING)
     assert check_log(log(SWING, *found)).findings == ()
 
 
-@pytest.mark.parametrize(
-    ("scale", "gravity"),
-    [(0.2, 4.0), (0.35, 0.0), (0.35, 4.0), (3.0, 4.0), (1e-3, 0.0), (180.0 / np.pi, 0.0)],
-)
+@pytest.mark.parametrize(("scale", "gravity"), [(0.35, 0.0), (0.35, 4.0), (3.0, 4.0), (1e-3, 0.0)])
 def test_a_wrong_scale_of_a_stiff_loop_is_found(scale: float, gravity: float) -> None:
-    reading, torque = joint(SWING, 60.0, 2.0, gravity=gravity)
+    reading, torque = joint(swing, 60.0, 2.0, gravity=gravity)
     assert Fault.UNIT not in faults(check_log(log(SWING, reading, torque)))
     assert Fault.UNIT in faults(check_log(log(SWING, scale * reading, torque)))
 
@@ -146,28 +137,26 @@ def test_a_wrong_scale_of_a_stiff_loop_is_found(scale: float, gravity: float) ->
 SLIPS: Elements = ((300.0, 0.05),)  # full after 0.17 mrad
 
 
-def small_motion(size: float, slow: float, fast: float, late: int) -> set[Fault]:
-    """What is said of a log without setpoint whose force is so many samples late."""
-    goal = waves(size, slow, fast)
-    gain = 8.0 * max(0.075 / size, 1.25)
-    reading, torque = joint(goal, gain, 0.1 * gain**0.5, elements=SLIPS)
-    columns = {"position": reading[100:], "force": np.roll(torque, late)[100:]}
-    return faults(check_log(Log(RATE, {"x": AxisLog(columns, ROTARY_UNITS)})))
+def slow() -> Array:
+    return waves(0.1, 0.5, 1.3)
 
 
-@pytest.mark.parametrize("size", [1e-2, 1e-1])
-def test_friction_with_a_memory_is_no_lag(size: float) -> None:
-    """What it lags by is a distance: another time at each speed."""
-    assert Fault.LAG not in small_motion(size, 0.5, 1.3, late=0)
+def tiny() -> Array:
+    return waves(1e-2, 2.0, 5.1)
 
 
 @pytest.mark.parametrize(
-    ("motion", "late"), [((1e-2, 2.0, 5.1), 20), ((1e-1, 0.5, 1.3), 60), ((1e-1, 0.5, 1.3), -60)]
+    ("motion", "gain", "late"),
+    [(slow, 10.0, 0), (slow, 10.0, 60), (slow, 10.0, -60), (tiny, 60.0, 20)],
 )
-def test_a_lag_beside_friction_with_a_memory_is_found(
-    motion: tuple[float, float, float], late: int
+def test_friction_with_a_memory_is_no_lag_and_hides_none(
+    motion: Callable[[], Array], gain: float, late: int
 ) -> None:
-    assert Fault.LAG in small_motion(*motion, late)
+    """What it lags by is a distance: another time at each speed."""
+    reading, torque = joint(motion, gain, 0.1 * gain**0.5, elements=SLIPS)
+    columns = {"position": reading[100:], "force": np.roll(torque, late)[100:]}
+    found = faults(check_log(Log(RATE, {"x": AxisLog(columns, ROTARY_UNITS)})))
+    assert (Fault.LAG in found) == (late != 0)
 
 
 def steps_and_rests(seconds: float = 16.0) -> Array:
@@ -190,7 +179,7 @@ def resampled(x: Array, every: int) -> Array:
 @pytest.mark.parametrize("every", [1, 5])
 def test_one_count_is_neither_stuck_nor_lost(every: int) -> None:
     goal = steps_and_rests()
-    reading, torque = joint(goal, 20.0, 0.5, count=COUNT)
+    reading, torque = joint(steps_and_rests, 20.0, 0.5, count=COUNT)
     rate, goal, torque = RATE / every, goal[::every], torque[::every]
     for seen in (reading[::every], resampled(reading, every)):
         assert not faults(check_log(log(goal, seen, torque, rate))) & BROKEN
@@ -205,6 +194,6 @@ def test_one_count_is_neither_stuck_nor_lost(every: int) -> None:
 def test_text_of_few_digits_is_neither_stuck_nor_lost() -> None:
     """A motor behind a gear, written with four digits: far from 0 a step is a hundred times one."""
     goal = steps_and_rests()
-    reading, torque = joint(goal, 20.0, 0.5)
+    reading, torque = joint(steps_and_rests, 20.0, 0.5)
     text = np.array([float(f"{24.0 * q:.4g}") for q in reading]) / 24.0
     assert not faults(check_log(log(goal, text, torque))) & BROKEN
