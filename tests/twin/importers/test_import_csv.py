@@ -1,11 +1,10 @@
 """Text tables as programs write them."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import MAP, RATE, mapping, table, write_csv
+from import_cases import MAP, mapping, table
 
 from twin.errors import InputError
 from twin.importers import import_log
@@ -94,38 +93,3 @@ def test_what_cannot_be_read_is_named(tmp_path: Path, text: str | bytes, message
         imported(tmp_path, text)
     assert "log.csv" in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-def test_a_header_line_that_does_not_fit_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="line 1 has 1 names, the rows have 4 cells"):
-        imported(tmp_path, "title\n" + PLAIN, "header_line = 1\n" + MAP)
-
-
-TIMED = MAP.replace("sample_rate = 2000.0", 'time = {column = "t", unit = "ms"}')
-
-
-def timed(folder: Path, change: Callable[[np.ndarray], None]) -> Log:
-    columns = table()
-    columns["t"] = 1e3 * columns["t"] + 5.0
-    change(columns["t"])
-    write_csv(folder / "log.csv", columns)
-    return import_log(folder / "log.csv", mapping(folder, TIMED))
-
-
-def test_the_rate_comes_from_the_times(tmp_path: Path) -> None:
-    assert timed(tmp_path, lambda t: None).sample_rate == RATE
-
-
-def test_times_of_day_are_precise_enough(tmp_path: Path) -> None:
-    def shift(t: np.ndarray) -> None:
-        t += 1.7e12  # ms since 1970; a double resolves 0.2 us there
-
-    assert timed(tmp_path, shift).sample_rate == RATE
-
-
-def test_uneven_times_are_refused_with_their_row(tmp_path: Path) -> None:
-    def gap(t: np.ndarray) -> None:
-        t[99:] += 0.5
-
-    with pytest.raises(InputError, match=r"has a gap: 0\.054 s is followed by 0\.055 s in row 100"):
-        timed(tmp_path, gap)

@@ -38,9 +38,6 @@ def assert_signals(log: Log, axis: str = "x", position: float = 1e-3) -> None:
     np.testing.assert_allclose(log.axes[axis].force, F, rtol=0, atol=1e-9)
 
 
-# --- TwinCAT Scope ------------------------------------------------------------------------------
-
-
 def scope(*, shared: bool, decimal: str = ",", end: str = "EOF\r\n", step: str = "1") -> str:
     """An export as Beckhoff describes it, a time for each channel or one for both."""
     between = [] if shared else [None]
@@ -67,8 +64,7 @@ def scope(*, shared: bool, decimal: str = ",", end: str = "EOF\r\n", step: str =
 SCOPE_MAP = map_of("MAIN.fPos", "MAIN.fForce", clock="")
 
 
-@pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize(("decimal", "end"), [(",", "EOF\r\n"), (".", "")])
+@pytest.mark.parametrize(("shared", "decimal", "end"), [(False, ",", "EOF\r\n"), (True, ".", "")])
 def test_twincat_scope(tmp_path, shared, decimal, end):
     (tmp_path / "a.csv").write_text(scope(shared=shared, decimal=decimal, end=end))
     log = imported(tmp_path, "a.csv", SCOPE_MAP)
@@ -84,8 +80,6 @@ def test_channels_of_two_sample_times_are_refused(tmp_path):
     with pytest.raises(InputError, match="sample times of 1, 2 ms"):
         imported(tmp_path, "a.csv", SCOPE_MAP)
 
-
-# --- MCAP ---------------------------------------------------------------------------------------
 
 JOINT_STATE = """std_msgs/Header header
 string[] name
@@ -119,8 +113,7 @@ def write_joint_states(path: Path) -> None:
         writer.finish()
 
 
-@pytest.mark.parametrize("entry", ["[2]", ".elbow"])
-@pytest.mark.parametrize("time", ["header.stamp", "log_time"])
+@pytest.mark.parametrize(("entry", "time"), [("[2]", "header.stamp"), (".elbow", "log_time")])
 def test_joint_states_of_ros_2(tmp_path, entry, time):
     write_joint_states(tmp_path / "a.mcap")
     position, force = (f"/joint_states.{name}{entry}" for name in ("position", "effort"))
@@ -206,9 +199,6 @@ def test_json_in_mcap_and_a_damaged_one(tmp_path):
         (tmp_path / "a.mcap").write_bytes(data)
         with pytest.raises(InputError, match=why):
             imported(tmp_path, "a.mcap", text)
-
-
-# --- times --------------------------------------------------------------------------------------
 
 
 def test_times_since_1970_are_shown_as_dates(tmp_path):

@@ -34,9 +34,7 @@ from scipy.io import loadmat
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
-from twin.importers.importer import FORMATS
 from twin.importers.table import numbers, require_columns, split_columns
-from twin.logs import read_log, write_log
 from twin.logs.log import FIELDS
 
 EMPS_MAP = Path(__file__).parents[3] / "examples" / "import_emps.toml"
@@ -125,8 +123,7 @@ def map_text(pattern: str, clock: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize("clock", ["rate", "time"])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(("case", "clock"), [*((c, "time") for c in CASES), ("csv", "rate")])
 def test_every_column_of_every_format_is_its_own_signal_in_si(tmp_path, case, clock):
     write, file, pattern, found = CASES[case]
     path, text = tmp_path / file, map_text(pattern, clock)
@@ -177,20 +174,15 @@ def test_a_damaged_file_is_one_line(tmp_path: Path, case: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("case", "module", "package"),
-    [
-        ("hdf5", "h5py", "h5py"),
-        ("parquet", "pyarrow.parquet", "pyarrow"),
-        ("tdms", "nptdms", "nptdms"),
-    ],
+    ("case", "module"), [("hdf5", "h5py"), ("parquet", "pyarrow.parquet"), ("tdms", "nptdms")]
 )
-def test_a_missing_package_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str, module: str, package: str
-) -> None:
+def test_a_missing_package_is_named(tmp_path, monkeypatch, case, module):
     write, name, pattern, _ = CASES[case]
     write(tmp_path / name, table())
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(InputError, match=rf"needs the package {package}.*proton-twin\[import\]"):
+    with pytest.raises(
+        InputError, match=rf"needs the package {module.split('.')[0]}.*proton-twin\[import\]"
+    ):
         import_log(tmp_path / name, mapping(tmp_path, named(pattern)))
 
 
@@ -264,17 +256,6 @@ def test_what_cannot_be_a_log_is_refused(tmp_path, name, write, text, message):
         import_log(tmp_path / name, mapping(tmp_path, text))
 
 
-def test_an_import_survives_the_log_format(tmp_path: Path) -> None:
-    write_mat(tmp_path / "log.mat", table())
-    text = MAP.replace('"mm", offset = 2.0', '"deg"').replace('"mA"', '"A"')
-    log = import_log(tmp_path / "log.mat", mapping(tmp_path, text))
-    write_log(log, tmp_path / "log.mcap")
-    back = read_log(tmp_path / "log.mcap")
-    assert back.metadata.items() >= log.metadata.items()
-    assert back.axes["x"].units["position"] == "rad"
-    np.testing.assert_array_equal(back.axes["x"].position, log.axes["x"].position)
-
-
 def test_the_emps_drive_is_imported(shared_data: Path) -> None:
     log = import_log(shared_data / "emps" / "DATA_EMPS.mat", load_mapping(EMPS_MAP))
     axis = log.axes["x"]
@@ -285,7 +266,7 @@ def test_the_emps_drive_is_imported(shared_data: Path) -> None:
     np.testing.assert_allclose(axis.force, record["gtau"].item() * record["vir"].ravel())
 
 
-@pytest.mark.parametrize("delay", [-23, -1, 1, 22, 23])
+@pytest.mark.parametrize("delay", [-23, -22, 22])
 def test_a_delay_may_leave_two_samples_and_no_fewer(tmp_path, delay):
     write_csv(tmp_path / "log.csv", {"q": np.arange(ROWS) + 1.0, "u": np.arange(ROWS) + 50.0})
     text = f"""
@@ -320,24 +301,17 @@ def test_a_matrix_is_split_along_its_shorter_side(shape):
     assert split_columns("m", np.array(3.0)) == {"m": np.array([3.0])}  # one row
 
 
-def test_dates_are_seconds_since_the_first_and_text_names_its_row():
+def test_dates_are_seconds_since_the_first_and_numbers_are_real_and_one_a_row():
     dates = np.array(["2024-01-01T00:00:59.5", "2024-01-01T00:01:01.75"], "datetime64[ms]")
     assert numbers("t", dates).tolist() == [0.0, 2.25]
     for kind in (np.int16, np.uint8, np.bool_, np.float32):
         assert numbers("n", np.array([1, 0], kind)).tolist() == [1.0, 0.0]
-    with pytest.raises(InputError, match=r"column 'q' does not hold one real .* 'c' in row 3"):
-        numbers("q", np.array([1.0, 2, "c"], object))
     for wrong in (np.zeros((2, 2)), np.array([1j, 2.0])):
         with pytest.raises(InputError, match="does not hold one real number a row"):
             numbers("q", wrong)
 
 
-def test_every_ending_belongs_to_one_format():
-    endings = [e for endings, _ in FORMATS.values() for e in endings]
-    assert len(set(endings)) == len(endings)
-
-
-@pytest.mark.parametrize("count", [40, 41, 43])
+@pytest.mark.parametrize("count", [40, 43])
 def test_a_message_lists_forty_columns_and_counts_the_others(count):
     there = [f"column{k}" for k in range(count)]
     with pytest.raises(InputError) as caught:

@@ -83,8 +83,6 @@ PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
           "force": "f"}, "setpoint_velocity"),
         ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
          {"position": "angle", "setpoint_position": "u", "force": "w"}, 'unit = "deg"'),
-        ({"t": T, "position": REACHED, "goal_position": GOAL, "load": PUSH},
-         {"position": "position", "setpoint_position": "goal_position", "force": "load"}, ""),
         ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
          {"position": "present_position", "setpoint_position": "goal", "force": "load"}, ""),
         ({"t": T, "pos": REACHED, "push": 40.0 * REACHED + 0.1 * PUSH},

@@ -71,7 +71,7 @@ def test_a_unit_of_another_quantity_is_refused():
                 find_unit(text, other)
 
 
-@pytest.mark.parametrize("text", ["V", "mV", "count", "counts", "increments", "digits", "%", "1"])
+@pytest.mark.parametrize("text", ["V", "counts", "%", "1"])
 def test_a_raw_unit_is_of_no_quantity_and_of_size_one(text):
     for si in ("m", "N m", "rad/s"):
         assert (find_unit(text, si).size, find_unit(text, si).si) == (1.0, None)
@@ -80,9 +80,6 @@ def test_a_raw_unit_is_of_no_quantity_and_of_size_one(text):
 def test_a_unit_that_two_quantities_know_is_that_of_the_first_allowed():
     assert find_unit("mm", "m", "rad").si == "m"
     assert find_unit("deg", "m", "rad").si == "rad"
-
-
-# Times
 
 
 def times(rate: float, count: int, late: dict[int, float] | None = None) -> np.ndarray:
@@ -105,7 +102,7 @@ def test_a_rate_is_whole_where_that_moves_no_time_by_a_hundredth_of_a_period(rat
     assert rate_of(times(rate, count)) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("row", [2, 30, 49])
+@pytest.mark.parametrize("row", [2, 49])
 def test_a_time_may_be_off_the_grid_by_a_hundredth_of_a_period(row):
     for part in (0.009, -0.009):
         assert rate_of(times(1000.0, 50, {row - 1: part})) == 1000.0
@@ -114,7 +111,7 @@ def test_a_time_may_be_off_the_grid_by_a_hundredth_of_a_period(row):
             rate_of(times(1000.0, 50, {row - 1: part}))
 
 
-@pytest.mark.parametrize("row", [2, 30, 50])
+@pytest.mark.parametrize("row", [2, 50])
 def test_times_that_stop_repeat_or_leave_a_gap_name_the_row(row):
     late = dict.fromkeys(range(row - 1, 50), 0.49)
     with pytest.raises(InputError, match="off the even grid"):

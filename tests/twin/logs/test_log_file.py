@@ -12,14 +12,14 @@ from io import BytesIO
 import numpy as np
 import pytest
 import zstandard
-from log_cases import assert_same_log, two_axes, write_together
+from log_cases import assert_same_log, two_axes
 from mcap import records as kinds
 from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_bytes import of, parsed, parsed_message, pieces, records
 from mcap_protobuf.decoder import DecoderFactory
 
-from twin.logs import FIELDS, ROTARY_UNITS, AxisLog, Log, read_log, write_log
+from twin.logs import FIELDS, AxisLog, Log, read_log, write_log
 
 RATE, COUNT, PER_CHUNK = 3000.0, 45, 7
 TRUTH = ("position", *(f"state{k}" for k in range(17)))
@@ -187,7 +187,7 @@ def test_stock_readers_accept_every_checksum_and_find_samples_by_time(data):
     assert [m.sequence for _, _, m in last] == [COUNT - 1]
 
 
-@pytest.mark.parametrize("rows", [0.5, 1, 2, 5, 44, 45, 46])
+@pytest.mark.parametrize("rows", [0.5, 2, 44, 45])
 def test_the_size_of_the_chunks_changes_no_sample(tmp_path, rows):
     """Of one row at least, though it is larger than a chunk."""
     write_log(LOG, tmp_path / "a.mcap", chunk_bytes=int(rows * ROW))
@@ -207,7 +207,7 @@ def test_writing_what_was_read_gives_the_same_bytes(tmp_path):
     assert first.read_bytes() == second.read_bytes() == third.read_bytes()
 
 
-@pytest.mark.parametrize("rate", [1.0, 3.0, 50.0, 999.5, 1000.0, 44_100.5, 65_537.0, 1e6 / 7.0])
+@pytest.mark.parametrize("rate", [1.0, 999.5, 44_100.5, 1e6 / 7.0])
 def test_times_are_exact_at_every_rate(tmp_path, rate):
     for count in (1, 5000):
         axis = AxisLog({"position": np.arange(float(count)), "force": np.zeros(count)})
@@ -216,12 +216,6 @@ def test_times_are_exact_at_every_rate(tmp_path, rate):
     (content,) = in_chunks((tmp_path / "a.mcap").read_bytes())
     times = [parsed_message(p).log_time for p in content[2:]]
     assert times == [exact(k, rate) for k in range(5000)]
-
-
-def test_a_rotary_axis_keeps_its_units(tmp_path):
-    columns = {"position": np.ones(3), "current": np.ones(3)}
-    write_log(Log(1e3, {"motor": AxisLog(columns, ROTARY_UNITS, 0.1)}), tmp_path / "a.mcap")
-    assert read_log(tmp_path / "a.mcap").axes["motor"].units == ROTARY_UNITS
 
 
 def test_reading_needs_little_more_memory_than_the_result(tmp_path):
@@ -233,21 +227,3 @@ def test_reading_needs_little_more_memory_than_the_result(tmp_path):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 4 * 8 * count + 6 * (1 << 20)
-
-
-def test_a_log_is_smaller_than_the_stock_writers(tmp_path):
-    """Though that has all topics in one chunk, whose messages repeat the head of the one before."""
-    count, rng = 4000, np.random.default_rng(1)
-    t = np.arange(count) / 1e4
-
-    def axis(phase: float) -> AxisLog:
-        motion = 0.1 * np.sin(9.0 * t + phase)
-        noisy = {"position": 1e-9, "force": 0.05, "current": 1e-3}
-        read = {n: motion + size * rng.standard_normal(count) for n, size in noisy.items()}
-        return AxisLog({f: read.get(f, motion) for f in FIELDS if f != "velocity"})
-
-    log = Log(1e4, {"x": axis(0.0), "y": axis(1.0)})
-    write_log(log, tmp_path / "own.mcap")
-    write_together(tmp_path / "stock.mcap", log, rows=4000)
-    own, stock = ((tmp_path / f"{n}.mcap").stat().st_size for n in ("own", "stock"))
-    assert own < stock

@@ -72,17 +72,6 @@ def test_kept_left_out_and_damaged_are_all_samples(tmp_path, intact, bad, gone):
         assert len(recovery.lost) == len(bad) + len(runs) + gaps
 
 
-@pytest.mark.parametrize("number", range(CHUNKS - 1))
-def test_a_chunk_written_twice_or_too_late_costs_no_sample_without_a_word(tmp_path, intact, number):
-    data, start = intact.data, intact.chunks[number].start
-    middle, end = intact.behind(number), intact.behind(number + 1)
-    twice = data[:end] + data[start:middle] + data[end:]
-    late = data[:start] + data[middle:end] + data[start:middle] + data[end:]
-    for changed in (twice, late):
-        _, recovery = recovered(tmp_path / "a.mcap", changed)
-        assert account(intact, recovery).all == set(range(COUNT))
-
-
 def test_a_file_cut_off_keeps_every_chunk_before_the_cut(tmp_path, intact):
     """Cut at, before and behind every end of a record, and within each."""
     ends = [r.end for r in intact.records]
@@ -199,9 +188,6 @@ def test_a_nan_splits_a_recovered_log(tmp_path):
     assert "position is nan at 0.14 s" in recovery.lost[0]
 
 
-# Several topics, and files
-
-
 TWO = two_axes()
 
 
@@ -215,7 +201,7 @@ def test_an_intact_log_is_recovered_whole(tmp_path):
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_damage_did_not_touch_comes_back_whatever_else_is_lost(tmp_path, seed):
     """Every sample of every topic, in the log or in those beside it; and each is as written."""
     rng, path = np.random.default_rng(seed), tmp_path / "a.mcap"

@@ -79,12 +79,12 @@ REFUSED = {
                        "states no sample rate; .*twin import"),
     **{f"{key} {text}": (stated({key: text}), f"metadata {key} is {text!r}; give a number above 0")
        for key in ("sample_rate_hz", "force_constant")
-       for text in ("0", "-1", "nan", "inf", "x", "")},
+       for text in ("0", "nan", "x")},
     **{f"no {name}": (without(name), f"/axis/x has no {lacking}; fields in its messages: {there}$")
        for name, lacking, there in (("position", "position", "force, velocity, note.*"),
                                     ("force", "current or force", "position, velocity, note.*"))},
     **{f"{name} in {unit}": (stated({f"unit.{name}": unit}), f"unit of {name} is '{unit}'")
-       for name in FIELDS for unit in ("mm", "kN", "", "g")},
+       for name in FIELDS for unit in ("mm", "")},
     **{f"nan {k}": ([*HEAD, *SAMPLES[:k], message(1, k, {"position": 1.0, "force": np.nan}),
                      *SAMPLES[k + 1 :]], rf"/axis/x: force is nan at {k / 1e3:g} s .sample {k}.")
        for k in (0, 4)},
@@ -139,8 +139,8 @@ def test_a_unit_of_each_field_is_that_of_a_linear_or_of_a_rotary_axis(tmp_path, 
         assert accepted(tmp_path / "a.mcap", items).axes["x"].units == wanted
 
 
-@pytest.mark.parametrize("time", [1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1])
-@pytest.mark.parametrize("k", [0, 3, 5])
+@pytest.mark.parametrize("time", [1 << 62, 1 << 63, (1 << 64) - 1])
+@pytest.mark.parametrize("k", [0, 5])
 def test_a_time_that_no_clock_shows_is_one_line(tmp_path, time, k):
     path = tmp_path / "a.mcap"
     samples = [sample(j, time=time if j == k else None) for j in range(6)]
@@ -149,7 +149,7 @@ def test_a_time_that_no_clock_shows_is_one_line(tmp_path, time, k):
         recover_log(path)
 
 
-@pytest.mark.parametrize("rate", ["9999", "1e-300", "1e-9", "1e300", "999.999"])
+@pytest.mark.parametrize("rate", ["9999", "1e-300", "999.999"])
 def test_a_rate_that_the_times_deny_is_not_believed(tmp_path, rate):
     path = tmp_path / "a.mcap"
     refused(path, [HEAD[0], channel(1, "/axis/x", {"sample_rate_hz": rate}), *SAMPLES], "/axis/x: ")
@@ -178,13 +178,6 @@ def test_what_topics_have_in_common_is_kept_at_the_same_times(tmp_path, y):
     for number, name in ((1, "x"), (2, "y")):
         assert log.axes[name].position.tolist() == [10.0 * number + k for k in both]
     assert recovery.kept == f"{len(both)} samples from {both.start / 1e3:g} s"
-
-
-def test_every_chunk_states_its_checksum(tmp_path):
-    content = joined([*HEAD, *SAMPLES])
-    (tmp_path / "a.mcap").write_bytes(plain_file([Chunk("", content, 0, 0, 0, len(content))]))
-    with pytest.raises(InputError, match=r"chunk at byte .*: states no checksum of its samples"):
-        read_log(tmp_path / "a.mcap")
 
 
 def in_one_chunk(content: bytes) -> bytes:
