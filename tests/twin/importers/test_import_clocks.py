@@ -142,6 +142,19 @@ def test_two_files_on_one_clock(tmp_path):
     assert "x.force" in log.metadata["resampled_2"]
 
 
+def test_files_of_one_rate_need_no_clock(tmp_path):
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((2, 50))
+    for name, column in zip("ab", columns, strict=True):
+        (tmp_path / f"{name}.csv").write_text("\n".join(["q", *map(repr, column.tolist())]) + "\n")
+    rates = 2 * "[[files]]\nsample_rate = 500.0\n"
+    both = mapping(tmp_path, rates + TWO[TWO.index("[axes.x]") :])
+    log = import_log([tmp_path / "a.csv", tmp_path / "b.csv"], both)
+    assert log.sample_rate == 500.0
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * columns[0], rtol=1e-12)
+    np.testing.assert_allclose(log.axes["x"].force, columns[1], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
