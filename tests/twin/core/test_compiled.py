@@ -86,9 +86,6 @@ def test_a_change_of_law_structure_or_controller_is_seen_by_the_next_process(
         assert abs(after[what] / value - 1.0) > 1e-6, f"{what}: the old code ran"
 
 
-# --- what a digest knows -------------------------------------------------------------------------
-
-
 def shifted(x):
     return x + SHIFT  # noqa: F821
 
@@ -116,8 +113,6 @@ def test_digest_differs_by_every_constant_callee_and_array_that_is_compiled_in()
     again = with_globals(outer, shifted=alike, SCALE=2.0, TABLE=table.copy())
     assert digest(again) == digest(variants[0])
 
-
-# --- the plain functions that a law calls --------------------------------------------------------
 
 LAW = """
 from math import copysign

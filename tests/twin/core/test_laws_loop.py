@@ -45,8 +45,7 @@ class Pid:
         return min(max(asked, -self.limit), self.limit)
 
 
-@pytest.mark.parametrize("bandwidth", [5.0, 80.0])
-@pytest.mark.parametrize("mass", [0.3, 17.0])
+@pytest.mark.parametrize(("bandwidth", "mass"), [(5.0, 17.0), (80.0, 0.3)])
 def test_a_loop_made_for_an_axis_crosses_over_near_its_bandwidth(
     bandwidth: float, mass: float
 ) -> None:

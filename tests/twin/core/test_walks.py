@@ -74,8 +74,6 @@ def test_no_effects_give_no_force() -> None:
     assert not total_forces(table, table.parameters[None], motion()).any()
 
 
-# --- columns of a law of many strengths: times the strengths they are the law ---------------------
-
 COLUMNS = [e for e in CATALOGUE.values() if e.columns]
 LAID = ({}, {"closed": 1.0, "per_metre": 40.0}, {"per_metre": 0.0, "per_speed": 5.0, "rest": 0.02})
 

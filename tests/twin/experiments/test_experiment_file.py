@@ -58,8 +58,6 @@ FAULTS = {
     "text for a number": (PASSES.replace("0.05", "'fast'"), "m/s"),
     "negative": (PASSES.replace("0.05", "-0.05"), "m/s"),
     "not finite": (PASSES.replace("0.05", "inf"), "m/s"),
-    "a list": (PASSES.replace("0.05", "[0.05]"), "m/s"),
-    "half a repeat": (PASSES.replace("repeats = 1", "repeats = 1.5"), "whole number"),
     "beyond the speed": (PASSES.replace("0.05", "0.5"), "0.25 m/s"),
     "beyond the travel": (PASSES.replace("0.1", "0.5"), "0.17 m"),
     "unknown axis": (PASSES.replace('"x"', '"z"'), "x, y"),
@@ -84,17 +82,10 @@ BAD_INPUT = (
     (("plan", "proton_xy", "--axis", "z"), "x, y"),
     (("plan", "proton_xy", "--duration", "-1"), "0 s"),
     (("plan", "proton_xy", "--duration", "1e9"), "allowed are 1 to 36000000"),
-    *(
-        (("simulate", name, "--duration", seconds), said)
-        for name in ("moves", "velocity_map", "cable_pass")
-        for seconds, said in (
-            ("nan", "above 0 s"),
-            ("inf", "above 0 s"),
-            ("-3", "above 0 s"),
-            ("0", "above 0 s"),
-            ("1e9", "allowed are 1 to 36000000"),
-        )
-    ),
+    (("simulate", "moves", "--duration", "nan"), "above 0 s"),
+    (("simulate", "velocity_map", "--duration", "0"), "above 0 s"),
+    (("simulate", "cable_pass", "--duration", "inf"), "above 0 s"),
+    (("simulate", "moves", "--duration", "1e9"), "allowed are 1 to 36000000"),
     (("simulate", "moves", "--seed", "-1"), "seed -1: is not allowed; give a whole number of 0 or"),
     (("demo", "--seed", "-1", "-o", "d"), "seed -1: is not allowed"),
     (("plan", "proton_xy", "--test-function", "nan"), "a test function of nan s: give a length"),
@@ -119,16 +110,14 @@ def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
     assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)
 
 
-# Setpoints as CSV
-
-
 def read(path: Path) -> dict[str, np.ndarray]:
     head, *rows = path.read_text().splitlines()
     return dict(zip(head.split(","), np.loadtxt(rows, delimiter=",").T, strict=True))
 
 
-@pytest.mark.parametrize("experiment", [Moves(40, duration=2.0), Passes("y", 0.02, 0.05, 1)])
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize(
+    ("experiment", "seed"), [(Moves(40, duration=1.0), 3), (Passes("y", 0.02, 0.05, 1), 0)]
+)
 def test_the_table_is_the_setpoint_of_the_simulation_of_that_seed(experiment, seed, tmp_path):
     write_setpoints(experiment, PROTON, seed, tmp_path / "s.csv")
     log = simulate(PROTON, experiment, seed=seed)

@@ -111,8 +111,6 @@ def test_a_rotary_axis_is_logged_in_its_units(rotary, units):
     assert log.axes["x"].units == units
 
 
-# A recorded reference
-
 STAGE = replace(load_model("proton_xy", CATALOGUE), sample_rate=2000.0)
 
 

