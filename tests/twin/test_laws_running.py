@@ -37,9 +37,6 @@ def setpoint(n: int) -> Setpoint:
     return Setpoint(x, v, a, np.zeros_like(x), RATE)
 
 
-# --- parts and the whole -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
 def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
     """The same seed draws the same noise, part by part; what comes later changes nothing."""
@@ -72,9 +69,6 @@ def test_states_are_logged_under_their_names_where_they_are_few():
     bristle = done.states[:, [a for a, _ in done.state_names].index("x")]
     force = done.forces[:, done.table.labels.index(("x", "lugre"))]
     assert np.corrcoef(bristle, force)[0, 1] < -0.9
-
-
-# --- what a user gives ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -127,9 +121,6 @@ def test_a_long_value_is_cut_in_a_message():
     assert shown(deep) == "something too large to be shown"
     while deep:  # to be freed without recursion
         deep = deep[0]
-
-
-# --- the origin of time ---------------------------------------------------------------------
 
 
 def _index_and_time(p, s, io):

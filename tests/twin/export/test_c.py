@@ -16,9 +16,9 @@ from numpy.polynomial import Polynomial
 from twin.effect import Effect, Kind
 from twin.export.c_source import CSource, c_source
 from twin.feedforward import feedforward, followed
-from twin.laws.trials import companion, moderate
-from twin.model.file import load_model
-from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.laws.trials import Motion, companion, forces, moderate
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.signals import Array
 
 PERIOD = 1e-4
@@ -90,7 +90,7 @@ def alone(tmp_path_factory) -> tuple[CSource, ctypes.CDLL]:
 
 @pytest.fixture(scope="module")
 def motion() -> Array:
-    return moves(10.0)
+    return moves(4.0)
 
 
 @needs_compiler
@@ -129,8 +129,6 @@ def test_a_current_is_the_force_over_its_constant(alone) -> None:
 @pytest.mark.parametrize("axis", [n for n in AXES if n not in OF_TWO])
 def test_under_its_feedforward_the_equation_of_motion_holds(axis) -> None:
     """Along moves, and with all effects, the lost ones apart, mass x acceleration is the force."""
-    from twin.laws.trials import Motion, forces
-
     motion = moves(1.0)
     kept = followed(AXES[axis]).axis
     command = feedforward(kept, motion, np.zeros_like(motion), PERIOD)
@@ -171,8 +169,6 @@ def test_what_cannot_be_fed_forward_is_told(tmp_path) -> None:
 
 
 def test_bands_of_the_last_fit_stand_beside_the_values() -> None:
-    from twin.model.machine import AxisIntervals
-
     stage = load_model("proton_xy", CATALOGUE)
     stage = stage.with_intervals("x", AxisIntervals({"lugre.Fc": (0.27, 0.2912)}, 1.0))
     assert (
@@ -188,7 +184,5 @@ def test_the_command_writes_the_files_and_says_what_is_in_them(tmp_path) -> None
         assert (tmp_path / "into" / f"proton_motion_stage{suffix}").stat().st_size > 1000
     assert "did you mean 'c'" in refusal("export", "proton_xy", "--to", "c9", folder=tmp_path)
     imposed = replace(load_model("proton_xy", CATALOGUE).axes["x"], mass=0.0, effects=())
-    from twin.model.file import save_model
-
     save_model(MachineModel("held", {"x": imposed}), tmp_path / "held.toml")
     assert "imposed" in refusal("export", "held.toml", "--to", "c", folder=tmp_path)
