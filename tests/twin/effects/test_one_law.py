@@ -1,18 +1,13 @@
 """A diagnosis offers each law once, by the name that fits the axis and what it has already."""
 
-import numpy as np
-import pytest
 from effect_runs import CATALOGUE, FRICTIONS
 
-from twin.effect import Effect
-from twin.laws.trials import Motion, forces, moderate
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted
 
 CABLE = {"cable_slab", "cable_hysteresis"}
 GENERAL = {"spring", "presliding_hysteresis"}
 BARE = AxisModel(1.0)
-ONE_LAW = [("cable_slab", "spring"), ("cable_hysteresis", "presliding_hysteresis")]
 
 
 def offered(axis: AxisModel) -> set[str]:
@@ -22,21 +17,6 @@ def offered(axis: AxisModel) -> set[str]:
 def having(*names: str, rotary: bool = False) -> AxisModel:
     fitted = tuple(Fitted.at_start(CATALOGUE[n]) for n in names)
     return AxisModel(1.0, effects=fitted, rotary=rotary)
-
-
-@pytest.mark.parametrize("pair", ONE_LAW, ids=str)
-def test_two_names_are_one_law(pair: tuple[str, str]) -> None:
-    rng, motion = np.random.default_rng(4), Motion.cycles(0.07)
-    special, general = (CATALOGUE[n] for n in pair)
-    values = {p.name: 0.0 for p in general.parameters} | moderate(special, rng)
-
-    def force(effect: Effect) -> np.ndarray:
-        return forces([Fitted.at_start(effect, values if effect is general else {
-            p.name: values[p.name] for p in effect.parameters
-        })], motion)[effect.name]  # fmt: skip
-
-    assert np.abs(force(special)).max() > 0.1
-    np.testing.assert_allclose(force(general), force(special), rtol=1e-12)
 
 
 def test_a_machine_without_a_cable_is_offered_no_cable() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import refusal
+from cli_runs import in_small, twin
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
@@ -106,10 +106,6 @@ def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeyp
     assert [f.name for f in tmp_path.iterdir()] == ["next.toml"], "something was written"
 
 
-def test_a_refusal_is_one_line_with_exit_code_two(tmp_path):
-    assert "s" in refusal("plan", "proton_xy", "--duration", "0", folder=tmp_path)
-
-
 def read(path: Path) -> dict[str, np.ndarray]:
     head, *rows = path.read_text().splitlines()
     return dict(zip(head.split(","), np.loadtxt(rows, delimiter=",").T, strict=True))
@@ -147,8 +143,3 @@ def test_a_long_table_is_written_in_parts_without_a_gap(tmp_path):
     time = np.loadtxt(tmp_path / "s.csv", delimiter=",", skiprows=1, usecols=0)
     assert len(time) > 1.05e5  # parts are of 1e5 rows
     np.testing.assert_allclose(np.diff(time), 1e-4, atol=1e-7)
-
-
-def test_a_folder_that_is_not_there_is_one_line(tmp_path):
-    with pytest.raises(InputError, match="its folder does not exist"):
-        write_setpoints(Moves(2), PROTON, 0, tmp_path / "none" / "s.csv")

@@ -14,7 +14,7 @@ from twin.errors import InputError
 from twin.experiments.follow import follow_parts, recorded_setpoint, replay
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
-from twin.logs import LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
+from twin.logs import AxisLog, Log
 from twin.logs.log import joined
 from twin.model.file import load_model, parse_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
@@ -98,17 +98,6 @@ def test_the_noise_of_a_current_is_its_own_and_rides_on_the_force():
         np.testing.assert_allclose(columns["force"], 13.0 * columns["current"])
     assert abs(np.corrcoef(*added)[0, 1]) < 0.25
     np.testing.assert_array_equal(log.axes["x"].position, still.axes["x"].position)
-
-
-@pytest.mark.parametrize(("rotary", "units"), [(False, LINEAR_UNITS), (True, ROTARY_UNITS)])
-def test_a_rotary_axis_is_logged_in_its_units(rotary, units):
-    axis = AxisModel(0.2, QUIET, (), rotary=rotary)
-    model = MachineModel("m", {"x": axis}, RATE)
-    both = setpoint()
-    one = Setpoint(*(c[:, :1] for c in (both.position, both.velocity, both.acceleration,
-                                        both.force)), RATE)  # fmt: skip
-    log = follow(model, one)
-    assert log.axes["x"].units == units
 
 
 STAGE = replace(load_model("proton_xy", CATALOGUE), sample_rate=2000.0)

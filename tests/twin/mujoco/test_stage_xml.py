@@ -1,6 +1,5 @@
 """The stage's MJCF: what it promises to the simulator, and nothing hidden in it."""
 
-from itertools import product
 from pathlib import Path
 
 import mujoco
@@ -49,26 +48,3 @@ def test_joint_limits_stop_the_axes(model: mujoco.MjModel) -> None:
     mujoco.mj_step(model, data, nstep=20_000)
     np.testing.assert_allclose(data.qpos, [TRAVEL, -TRAVEL], atol=2e-3)
     assert data.ncon == 0
-
-
-def test_moving_parts_clear_each_other_over_the_whole_travel(model: mujoco.MjModel) -> None:
-    """No visible part cuts into a part of another body, anywhere on a grid over the travel."""
-    assert not np.any(model.geom_contype)
-    assert not np.any(model.geom_conaffinity)
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    solids = [i for i in range(model.ngeom) if model.geom_type[i] != plane]
-    pairs = [
-        (a, b)
-        for a, b in product(solids, repeat=2)
-        if model.body(model.geom_bodyid[b]).name in ("beam", "carriage")
-        and model.geom_bodyid[a] < model.geom_bodyid[b]
-    ]
-    data = mujoco.MjData(model)
-    margin = 1e-3
-    for pose in product(np.linspace(-TRAVEL, TRAVEL, 5), repeat=2):
-        data.qpos[:] = pose
-        mujoco.mj_forward(model, data)
-        assert data.ncon == 0
-        for a, b in pairs:
-            gap = mujoco.mj_geomDistance(model, data, a, b, margin, None)
-            assert gap > 0, f"geoms {a} and {b} overlap at x, y = {pose}"
