@@ -149,9 +149,7 @@ def tiny() -> Array:
     ("motion", "gain", "late"),
     [(slow, 10.0, 0), (slow, 10.0, 60), (slow, 10.0, -60), (tiny, 60.0, 20)],
 )
-def test_friction_with_a_memory_is_no_lag_and_hides_none(
-    motion: Callable[[], Array], gain: float, late: int
-) -> None:
+def test_friction_with_a_memory_is_no_lag_and_hides_none(motion, gain, late):
     """What it lags by is a distance: another time at each speed."""
     reading, torque = joint(motion, gain, 0.1 * gain**0.5, elements=SLIPS)
     columns = {"position": reading[100:], "force": np.roll(torque, late)[100:]}

@@ -68,9 +68,7 @@ def run(folder: Path) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_a_change_of_law_structure_or_controller_is_seen_by_the_next_process(
-    tmp_path: Path,
-) -> None:
+def test_a_change_of_law_structure_or_controller_is_seen_by_the_next_process(tmp_path):
     # Times of change are copied too, so the copy begins with the caches that the suite has filled.
     shutil.copytree(PACKAGE, tmp_path / "twin")
     shutil.copytree(PACKAGE.parent / "models", tmp_path / "models")

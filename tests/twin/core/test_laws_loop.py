@@ -46,9 +46,7 @@ class Pid:
 
 
 @pytest.mark.parametrize(("bandwidth", "mass"), [(5.0, 17.0), (80.0, 0.3)])
-def test_a_loop_made_for_an_axis_crosses_over_near_its_bandwidth(
-    bandwidth: float, mass: float
-) -> None:
+def test_a_loop_made_for_an_axis_crosses_over_near_its_bandwidth(bandwidth, mass):
     """Gain 1 within a fifth of the bandwidth, a phase margin above 40 degrees; the integral part
     takes over a decade below, the proportional one a third.
     """

@@ -54,9 +54,7 @@ def attached(names: tuple[str, ...]) -> tuple[Fitted, ...]:
 @pytest.mark.parametrize(
     ("ratio", "friction"), [(-0.4, STICKS), (3.0, COULOMB)], ids=["stribeck", "coulomb"]
 )
-def test_a_payload_is_mass_also_where_friction_holds(
-    ratio: float, friction: Fitted, stage: Stepper
-) -> None:
+def test_a_payload_is_mass_also_where_friction_holds(ratio, friction, stage):
     around = (friction, ASYMMETRY, CABLE, DEADBAND, effect("cable_hysteresis", reach=3e-4, f1=0.7))
     force = shoves(N, 3.0)
     found = pushed(MASS, (*around, effect("payload_mass", ratio=ratio)), force, stage)
@@ -72,9 +70,7 @@ def test_a_payload_is_mass_also_where_friction_holds(
 @EACH
 @pytest.mark.parametrize("name", ["flexible_mode", "base_vibration"])
 @pytest.mark.parametrize("stiffness", [1e5, 1e9])
-def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(
-    name: str, stiffness: float, stage: Stepper
-) -> None:
+def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(name, stiffness, stage):
     """It stops what it stops: no deeper than a step of the fastest motion."""
     share = {"flexible_mode": "load", "base_vibration": "recoil"}[name]
     part = effect(name, frequency=20.0, **{share: 0.9})
@@ -85,9 +81,7 @@ def test_an_end_stop_of_any_stiffness_is_stable_whatever_is_attached(
 
 
 @pytest.mark.parametrize("load", [0.2, 0.8])
-def test_a_spring_beyond_the_sampling_rate_is_stable_and_the_same_in_both_simulations(
-    load: float,
-) -> None:
+def test_a_spring_beyond_the_sampling_rate_is_stable_and_the_same_in_both_simulations(load):
     part = effect("flexible_mode", load=load, frequency=2000.0, damping=1e-3)
     runs = [pushed(MASS, (part,), shoves(600, 20.0), stage) for stage in BOTH]
     assert np.abs(runs[0].v).max() < 1.5
@@ -96,9 +90,7 @@ def test_a_spring_beyond_the_sampling_rate_is_stable_and_the_same_in_both_simula
 
 @EACH
 @SETS
-def test_logged_forces_and_command_are_mass_times_acceleration(
-    names: tuple[str, ...], stage: Stepper
-) -> None:
+def test_logged_forces_and_command_are_mass_times_acceleration(names, stage):
     """Of the nominal mass: what the attached parts take or give is among the forces."""
     force = shoves(N, 3.0)
     run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
@@ -121,9 +113,7 @@ def test_what_friction_holds_is_at_rest(names: tuple[str, ...], stage: Stepper) 
 
 @EACH
 @SETS
-def test_momentum_of_all_parts_is_the_impulse_from_outside(
-    names: tuple[str, ...], stage: Stepper
-) -> None:
+def test_momentum_of_all_parts_is_the_impulse_from_outside(names, stage):
     """Parts on the axis are pushed by it alone: m v + loads' own momentum, in space."""
     force = shoves(N, 3.0)
     run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
@@ -145,9 +135,7 @@ FREE = [("flexible_mode", "load"), ("base_vibration", "recoil")]
 
 @pytest.mark.parametrize(("name", "share"), FREE, ids=[n for n, _ in FREE])
 @pytest.mark.parametrize("part", [0.2, 0.6])
-def test_a_free_axis_swings_at_the_frequency_and_damping_of_two_masses(
-    name: str, share: str, part: float
-) -> None:
+def test_a_free_axis_swings_at_the_frequency_and_damping_of_two_masses(name, share, part):
     """w/sqrt(1 - share), ratio/sqrt(1 - share): the poles of the free motion."""
     frequency, ratio = 23.0, 0.06
     force = np.zeros(900)

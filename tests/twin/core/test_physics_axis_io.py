@@ -83,9 +83,7 @@ def test_a_law_is_told_of_its_axis(stage: type[MujocoSimulator] | type[ReducedSi
 
 
 @BOTH
-def test_a_law_is_told_of_the_other_axis(
-    stage: type[MujocoSimulator] | type[ReducedSimulator],
-) -> None:
+def test_a_law_is_told_of_the_other_axis(stage):
     log = noted(note_other_axis, ("x", "v", "a", "friction"), stage)
     other = log.truth["y"]
     ahead = other["position"] + 0.5e-4 * other["velocity"]

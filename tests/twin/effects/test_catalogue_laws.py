@@ -68,9 +68,7 @@ ALL_BUT_FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is not Kind.FR
 @pytest.mark.parametrize(
     "effects", [ALL_BUT_FRICTIONS, *((f,) for f in FRICTIONS)], ids=lambda es: es[-1].name
 )
-def test_simulation_with_zero_strength_is_that_without(
-    effects: tuple[Effect, ...], stage: Stepper
-) -> None:
+def test_simulation_with_zero_strength_is_that_without(effects, stage):
     """Each friction in the place of the stage's, and all other effects at once."""
     kinds = {e.kind for e in effects}
     beside = [f for f in STAGE.axes["x"].effects if f.effect.kind not in kinds]

@@ -15,9 +15,7 @@ pushed = partial(pushed_at, rate=RATE)
 @EACH
 @pytest.mark.parametrize("share", [-0.5, 0.999])
 @pytest.mark.parametrize("name", ["coulomb_viscous", "stribeck"])
-def test_a_friction_that_sticks_does_not_creep_below_breakaway(
-    name: str, share: float, stage: Stepper
-) -> None:
+def test_a_friction_that_sticks_does_not_creep_below_breakaway(name, share, stage):
     assert friction(name).effect.sticks
     run = pushed(1.0, [friction(name)], np.full(5000, share * 1.5), stage)
     assert np.abs(run.x).max() < 1e-15

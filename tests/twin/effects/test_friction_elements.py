@@ -50,9 +50,7 @@ def test_elements_and_their_own_values_survive_saving(effect: Effect, tmp_path: 
 
 
 @EVERY
-def test_their_number_is_never_fitted_and_few_numbers_are_unless_asked(
-    effect: Effect, tmp_path: Path
-) -> None:
+def test_their_number_is_never_fitted_and_few_numbers_are_unless_asked(effect, tmp_path):
     def fitted(lines: str) -> set[str]:
         free = free_parameters(loaded(tmp_path, effect.name, lines).axes["x"])
         return {c.parameter.name for c in free}

@@ -31,8 +31,8 @@ def rms(a: Array) -> float:
     ids=["stage", "paper", "soft"],
 )  # fmt: skip
 def test_lugre_converges_to_the_stiff_solver_on_a_mass_pulled_by_a_spring(
-    p: dict[str, float], mass: float, spring: float, speed: float, duration: float, slips: int
-) -> None:
+    p, mass, spring, speed, duration, slips
+):
     """The spring's far end moves at a speed. The error halves with the step."""
 
     def rates(t: float, y: Array) -> list[float]:

@@ -73,9 +73,7 @@ def test_all_but_a_friction_is_absent_at_its_start() -> None:
      (0.04, 0.0, 0.2, False), (0.0, 0.04, 0.2, False),  # it hardly pushes
      (0.06, 0.06, 1e3, False), (0.0, 0.11, 1e3, False)],  # it leaves the travel no freedom
 )  # fmt: skip
-def test_an_end_stop_ends_a_travel_and_pushes(
-    low: float, high: float, push: float, itself: bool
-) -> None:
+def test_an_end_stop_ends_a_travel_and_pushes(low, high, push, itself):
     """Stops so far from the ends, parts of the travel; push: over the dry friction."""
     values = {
         "low": COVERED.position_low + low * COVERED.travel,

@@ -115,9 +115,7 @@ def scan(effect: str, name: str, e: Excitation = LOG) -> np.ndarray:
 @pytest.mark.parametrize(
     ("effect", "most", "travel"), [("cogging", 120, 0.02), ("force_constant_ripple", 70, 0.4)]
 )
-def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(
-    effect: str, most: int, travel: float
-) -> None:
+def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(effect, most, travel):
     """Up to as many cycles as the data can tell apart."""
     tried = scan(effect, "p", replace(LOG, position_low=0.03, position_high=0.03 + travel))
     halves = 2.0 * travel / tried

@@ -28,9 +28,7 @@ def recording(jitter: float, start: float = 0.0) -> dict[str, np.ndarray]:
     return {"t": start + t, "q": 30.0 * np.sin(9.0 * t), "f": 5.0 * np.cos(9.0 * t)}
 
 
-def test_jittered_stamps_come_onto_one_clock_and_the_log_says_what_that_cost(
-    tmp_path: Path,
-) -> None:
+def test_jittered_stamps_come_onto_one_clock_and_the_log_says_what_that_cost(tmp_path):
     columns = recording(jitter=0.8)
     columns = {n: np.insert(c, 1000, c[999]) for n, c in columns.items()}  # one row twice
     log = imported(tmp_path, columns)

@@ -180,9 +180,7 @@ WORDS_OF_A_SLIDE = re.compile(
 WORDS_OF_A_HINGE = re.compile(r"\b[Tt]orque\b|\bAngle\b|\bangle (error|between)")
 
 
-def test_texts_model_file_and_report_are_in_units_and_words_of_the_axis(
-    gone_round: Round, tmp_path: Path
-) -> None:
+def test_texts_model_file_and_report_are_in_units_and_words_of_the_axis(gone_round, tmp_path):
     printed = (texts(gone_round), page(gone_round, tmp_path / "report.html"))
     assert gone_round.units.mass_name in printed[1]
     for shown in printed:
@@ -215,9 +213,7 @@ def test_json_is_in_units_of_the_axis(gone_round: Round) -> None:
     assert not {other(u) for u in known} & units
 
 
-def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(
-    gone_round: Round,
-) -> None:
+def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(gone_round):
     left_out = ("axis_coupling",) if gone_round.kind == "three" else ()
     assert gone_round.found.not_tried == left_out
     told = as_json.json_of(gone_round.found)

@@ -12,7 +12,7 @@ from axis_runs import effect
 
 from twin.errors import InputError
 from twin.model.file import load_model
-from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.mjcf import Spring, machine_spec
 
 PERIOD = 2e-4  # s
@@ -38,9 +38,7 @@ def test_a_step_decays_and_swings_as_the_exact_motion_does(frequency: float, rat
 
 
 @pytest.mark.parametrize(("frequency", "share"), [(2e3, 0.1), (1e5, 0.6)])
-def test_a_spring_beyond_the_sampling_rate_is_held_where_the_step_is_stable(
-    frequency: float, share: float
-) -> None:
+def test_a_spring_beyond_the_sampling_rate_is_held_where_the_step_is_stable(frequency, share):
     spring = Spring.of(share, frequency, 0.05, PERIOD)
     assert spring.stiffness <= 2.0 * (1.0 - share) / PERIOD**2
     limit = Spring.of(share, 1e9, 0.05, PERIOD)
@@ -72,8 +70,6 @@ def test_axes_without_a_file_are_slides_and_hinges_in_turn() -> None:
         ("y", effect("base_vibration", recoil=0.9), "leaves .* kg for what the axis stands on"),
     ],
 )
-def test_more_than_the_axis_has_is_refused_with_its_mass(
-    axis: str, fitted: Fitted, message: str
-) -> None:
+def test_more_than_the_axis_has_is_refused_with_its_mass(axis, fitted, message):
     with pytest.raises(InputError, match=rf"axis {axis}: {fitted.effect.name}_{axis} {message}"):
         machine_spec(STAGE.with_axis(axis, STAGE.axes[axis].with_effect(fitted)))

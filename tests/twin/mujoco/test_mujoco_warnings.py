@@ -79,8 +79,8 @@ def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
 @BOTH
 @pytest.mark.parametrize(("axis", "largest"), [("x", "viscous_friction"), ("y", "spring")])
 def test_a_loop_that_swings_up_is_told_with_its_axis_and_the_largest_force_there(
-    simulator: type, axis: str, largest: str
-) -> None:
+    simulator, axis, largest
+):
     """No force is beyond measure by itself: the loop is too fast for its rate."""
     small = {"viscous_friction": {"c": 1e-3}, "spring": {"k1": 1e-3}}
     parts = tuple(

@@ -15,9 +15,7 @@ def model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(STAGE_XML))
 
 
-def test_sensors_read_the_joints_and_motors_take_newtons_up_to_their_limit(
-    model: mujoco.MjModel,
-) -> None:
+def test_sensors_read_the_joints_and_motors_take_newtons_up_to_their_limit(model):
     assert {model.actuator(i).name for i in range(model.nu)} == {"motor_x", "motor_y"}
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:], data.ctrl[:] = [0.01, -0.02], [0.3, -0.4], [1e4, -150.0]
