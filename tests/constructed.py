@@ -15,6 +15,7 @@ from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
 from twin.effects import load_catalogue
+from twin.experiments.trajectory import Setpoint
 from twin.laws.trials import companion
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
@@ -67,6 +68,14 @@ def ridden(command: Callable[[Motion], Array], duration: float = 6.0) -> Motion:
     force = 1.3 * np.gradient(v, 1e-3) + 0.7 * np.sign(v) + 0.9 * v + 0.2 - 3.0 * m + 40.0 * m**3
     u = force + command(motion)
     return replace(motion, signals=np.stack([m, v, u]), raw=np.stack([motion.raw[0], u]))
+
+
+def two_waves(samples: int, rate: float = 1000.0) -> Setpoint:
+    """Two axes that swing from rest, each in its own way."""
+    t = np.arange(samples)[:, None] / rate
+    w, size = np.array([[9.0, 23.0]]), np.array([[0.05, 0.02]])
+    x, v, a = size * (1.0 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
+    return Setpoint(x, v, a, np.zeros_like(x), rate)
 
 
 def windowed(motion: Motion, length: float = 0.05) -> PreparedLog:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from constructed import effect
+from constructed import effect, two_waves
 
 from twin import simulator
 from twin.core.control import Controller, gain_table
@@ -12,9 +12,7 @@ from twin.core.loop import N_SIGNALS, READING_COLUMN
 from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at
-from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.numbers import is_number
 from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
 
 RATE = 1000.0
@@ -30,19 +28,12 @@ MODEL = MachineModel(
 )  # fmt: skip
 
 
-def setpoint(n: int) -> Setpoint:
-    t = np.arange(n)[:, None] / RATE
-    w, size = np.array([[9.0, 23.0]]), np.array([[0.05, 0.02]])
-    x, v, a = size * (1.0 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
-    return Setpoint(x, v, a, np.zeros_like(x), RATE)
-
-
 @pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
 def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
     """The same seed draws the same noise, part by part; what comes later changes nothing."""
     chunk, more, told = simulator.CHUNK, 500, []
     n = 2 * chunk + more
-    wanted = setpoint(n)
+    wanted = two_waves(n)
     whole = run(
         MODEL, wanted, np.random.default_rng(3), simulator=stage,
         progress=lambda done, of: told.append((done, of)),
@@ -50,7 +41,7 @@ def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
     parts = list(run_parts(MODEL, wanted, np.random.default_rng(3), simulator=stage))
     assert [len(p) for p in parts] == [chunk, chunk, more]
     assert told == [(chunk, n), (2 * chunk, n), (n, n)]
-    begin = run(MODEL, setpoint(chunk), np.random.default_rng(3), simulator=stage)
+    begin = run(MODEL, two_waves(chunk), np.random.default_rng(3), simulator=stage)
     for name in ("signals", "forces", "states"):
         joined = np.concatenate([getattr(p, name) for p in parts])
         np.testing.assert_array_equal(joined, getattr(whole, name))
@@ -58,7 +49,7 @@ def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
 
 
 def test_states_are_logged_under_their_names_where_they_are_few():
-    done = run(MODEL, setpoint(200), np.random.default_rng(1), simulator=ReducedSimulator)
+    done = run(MODEL, two_waves(200), np.random.default_rng(1), simulator=ReducedSimulator)
     states = {f.effect.name: f.effect.states for axis in EFFECTS.values() for f in axis}
     assert len(states["gms"]) > simulator.WATCHED_STATES
     wanted = {("x", f"lugre_{s}") for s in states["lugre"]}
@@ -69,19 +60,6 @@ def test_states_are_logged_under_their_names_where_they_are_few():
     bristle = done.states[:, [a for a, _ in done.state_names].index("x")]
     force = done.forces[:, done.table.labels.index(("x", "lugre"))]
     assert np.corrcoef(bristle, force)[0, 1] < -0.9
-
-
-@pytest.mark.parametrize(
-    ("value", "number"),
-    [
-        (3, True), (-2.5, True), (np.float64(1.5), True), (np.int64(4), True), (0, True),
-        (True, False), (False, False), ("3", False), (None, False), ([1.0], False),
-        (float("nan"), False), (float("inf"), False), (10**400, False), (-(10**400), False),
-        (1.7e308, True),
-    ],
-)  # fmt: skip
-def test_a_number_is_finite_and_no_truth_value(value, number):
-    assert is_number(value) is number
 
 
 @pytest.mark.parametrize("kind", [InputError, CannotRun])

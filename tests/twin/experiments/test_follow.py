@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import CATALOGUE, effect
+from constructed import CATALOGUE, effect, two_waves
 
 from twin import simulator
 from twin.errors import InputError
@@ -30,13 +30,6 @@ def model_of(hardware: Hardware = QUIET) -> MachineModel:
     return MachineModel("m", axes, RATE)
 
 
-def setpoint() -> Setpoint:
-    t = np.arange(N)[:, None] / RATE
-    w, size = np.array([[9.0, 23.0]]), np.array([[0.05, 0.02]])
-    x, v, a = size * (1.0 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
-    return Setpoint(x, v, a, np.zeros_like(x), RATE)
-
-
 def noise(seed: int = 3):
     one, other = np.random.default_rng(seed).spawn(2)
     return one, other
@@ -48,7 +41,7 @@ def follow(model: MachineModel, wanted: Setpoint, seed: int = 0) -> Log:
 
 
 def test_every_column_is_the_signal_that_it_names():
-    model, wanted = model_of(), setpoint()
+    model, wanted = model_of(), two_waves(N)
     log = follow(model, wanted)
     run = simulator.run(model, wanted, noise()[0], simulator=ReducedSimulator)
     assert log.sample_rate == RATE
@@ -77,7 +70,7 @@ def test_every_column_is_the_signal_that_it_names():
 
 def test_what_made_a_log_is_written_into_it():
     model = model_of()
-    log = follow(model, setpoint(), seed=9)
+    log = follow(model, two_waves(N), seed=9)
     assert log.metadata["source"] == "simulation"
     assert (log.metadata["experiment"], log.metadata["seed"]) == ("n", "9")
     assert log.metadata["software"].startswith("proton-twin ")
@@ -89,8 +82,8 @@ def test_what_made_a_log_is_written_into_it():
 
 def test_the_noise_of_a_current_is_its_own_and_rides_on_the_force():
     loud = replace(QUIET, current_noise=0.02)
-    still = follow(model_of(), setpoint())
-    log = follow(model_of(loud), setpoint())
+    still = follow(model_of(), two_waves(N))
+    log = follow(model_of(loud), two_waves(N))
     added = [log.axes[a].columns["current"] - still.axes[a].columns["current"] for a in "xy"]
     for part, axis in zip(added, "xy", strict=True):
         assert np.std(part) == pytest.approx(0.02, rel=0.2)

@@ -130,9 +130,7 @@ def value_at(document: Any, path: tuple[Any, ...]) -> Any:
     [
         (("samplerate",), 2000.0, r"unknown entry 'samplerate'; did you mean 'sample_rate'\?"),
         (("axes", "x", "encoder_noise"), -1e-9, "encoder_noise = -1e-09: give a number from 0"),
-        (("axes", "x", "bandwidth"), -30, "axes.x: bandwidth = -30: give a number above 0.* Hz"),
         (("axes", "x", "force_constant"), 0, "force_constant = 0: give a number above 0.* N/A"),
-        (("axes", "x", "velocity"), True, "velocity = True: give a number above 0"),
         (("axes", "x", "travel"), [1.0, 0.0], r"travel = \[1.0, 0.0\]: give two numbers, the low"),
         (("axes", "x", "effects", "coging"), {}, "did you mean 'cogging'"),
         (("axes", "x", "effects", "cogging"), {"pich": 1.0}, "'cogging' has no parameter 'pich'"),

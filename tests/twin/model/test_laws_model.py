@@ -61,19 +61,6 @@ def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
                 assert str(told.value).startswith(f"{name}.{p.name} = ")
 
 
-@pytest.mark.parametrize("value", [math.nan, -math.inf, "2"])
-def test_what_is_no_finite_number_is_refused(value):
-    with pytest.raises(InputError, match=r"pair.low = .*: is not a finite number; give it in N"):
-        Fitted.at_start(PAIR, {"low": value})
-
-
-@pytest.mark.parametrize("mass", [-5e-324, math.inf])
-def test_a_mass_is_finite_and_not_below_zero(mass):
-    with pytest.raises(InputError, match="must be a positive number of kg"):
-        AxisModel(mass)
-    assert AxisModel(5e-324).mass > 0.0
-
-
 def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothing_else():
     swapped = axis().with_effect(Fitted.at_start(OTHER))
     assert swapped.names == ("pair", "spring", "glide")

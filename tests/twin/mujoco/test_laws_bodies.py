@@ -11,7 +11,7 @@ import pytest
 from axis_runs import effect
 
 from twin.errors import InputError
-from twin.model.file import load_model
+from twin.model.file import load_model, models_folder
 from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.mjcf import Spring, machine_spec
 
@@ -73,3 +73,41 @@ def test_axes_without_a_file_are_slides_and_hinges_in_turn() -> None:
 def test_more_than_the_axis_has_is_refused_with_its_mass(axis, fitted, message):
     with pytest.raises(InputError, match=rf"axis {axis}: {fitted.effect.name}_{axis} {message}"):
         machine_spec(STAGE.with_axis(axis, STAGE.axes[axis].with_effect(fitted)))
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(models_folder() / "proton_xy.xml"))
+
+
+def test_sensors_read_the_joints_and_motors_take_newtons_up_to_their_limit(model):
+    assert {model.actuator(i).name for i in range(model.nu)} == {"motor_x", "motor_y"}
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = [0.01, -0.02], [0.3, -0.4], [1e4, -150.0]
+    mujoco.mj_forward(model, data)
+    readings = {model.sensor(i).name: data.sensor(i).data.item() for i in range(model.nsensor)}
+    expected = {"position_x": 0.01, "velocity_x": 0.3, "position_y": -0.02, "velocity_y": -0.4}
+    assert readings == expected
+    np.testing.assert_array_equal(data.actuator_force, [200.0, -150.0])
+
+
+def test_steps_at_the_control_rate_and_lets_passive_forces_in(model: mujoco.MjModel) -> None:
+    assert model.opt.timestep == 1e-4
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
+    disabled = mujoco.mjtDisableBit
+    assert model.opt.disableflags & disabled.mjDSBL_CONTACT
+    # With springs and dampers both off MuJoCo skips the passive callback; limits need constraints.
+    needed = (
+        disabled.mjDSBL_SPRING | disabled.mjDSBL_DAMPER | disabled.mjDSBL_ACTUATION
+        | disabled.mjDSBL_SENSOR | disabled.mjDSBL_CONSTRAINT | disabled.mjDSBL_LIMIT
+        | disabled.mjDSBL_CLAMPCTRL
+    )  # fmt: skip
+    assert not model.opt.disableflags & needed
+
+
+def test_joint_limits_stop_the_axes(model: mujoco.MjModel) -> None:
+    data = mujoco.MjData(model)
+    data.ctrl[:] = [20.0, -20.0]
+    mujoco.mj_step(model, data, nstep=20_000)
+    np.testing.assert_allclose(data.qpos, [0.17, -0.17], atol=2e-3)
+    assert data.ncon == 0
