@@ -6,15 +6,15 @@ motion to the forces along it, gives the forces of the way there.
 """
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
-from axis_runs import BOTH, RATE, Stepper, effect, pushed, shoves
+from axis_runs import BOTH, RATE, Pushed, Stepper, effect, pushed, shoves
 from effect_runs import CATALOGUE
 from scipy.integrate import solve_ivp
 
 from twin.laws.trials import Motion, forces
-from twin.model.machine import Fitted
 from twin.signals import Array
 
 EACH = pytest.mark.parametrize("stage", BOTH)
@@ -43,11 +43,14 @@ TOGETHER = {
     "all": tuple(PARTS),
 }
 SETS = pytest.mark.parametrize("names", TOGETHER.values(), ids=TOGETHER)
+SHOVES = shoves(N, 3.0)
 AROUND = (STICKS, ASYMMETRY, CABLE, DEADBAND)
 
 
-def attached(names: tuple[str, ...]) -> tuple[Fitted, ...]:
-    return tuple(PARTS[n] for n in names)
+@cache
+def shoved(names: tuple[str, ...], stage: Stepper) -> Pushed:
+    """The axis with these parts, and what holds and rubs it, under the shoves."""
+    return pushed(MASS, (*AROUND, *(PARTS[n] for n in names)), SHOVES, stage)
 
 
 @EACH
@@ -92,9 +95,8 @@ def test_a_spring_beyond_the_sampling_rate_is_stable_and_the_same_in_both_simula
 @SETS
 def test_logged_forces_and_command_are_mass_times_acceleration(names, stage):
     """Of the nominal mass: what the attached parts take or give is among the forces."""
-    force = shoves(N, 3.0)
-    run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
-    total = force + run.of(*run.rows)
+    run = shoved(names, stage)
+    total = SHOVES + run.of(*run.rows)
     wanted = MASS * np.diff(run.v) / H
     np.testing.assert_allclose(total[:-1], wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())
     assert all(np.ptp(run.rows[n]) > 0.01 for n in names), "blind"
@@ -103,7 +105,7 @@ def test_logged_forces_and_command_are_mass_times_acceleration(names, stage):
 @EACH
 @SETS
 def test_what_friction_holds_is_at_rest(names: tuple[str, ...], stage: Stepper) -> None:
-    run = pushed(MASS, (*AROUND, *attached(names)), shoves(N, 3.0), stage)
+    run = shoved(names, stage)
     held = run.states["stribeck_at_rest"][:-1] > 0.5
     assert 0.1 < held.mean() < 0.9
     fast = np.abs(run.v).max()
@@ -115,9 +117,8 @@ def test_what_friction_holds_is_at_rest(names: tuple[str, ...], stage: Stepper) 
 @SETS
 def test_momentum_of_all_parts_is_the_impulse_from_outside(names, stage):
     """Parts on the axis are pushed by it alone: m v + loads' own momentum, in space."""
-    force = shoves(N, 3.0)
-    run = pushed(MASS, (*AROUND, *attached(names)), force, stage)
-    outside = force + run.of("stribeck", "cable_slab", "actuator_deadband")
+    run = shoved(names, stage)
+    outside = SHOVES + run.of("stribeck", "cable_slab", "actuator_deadband")
     base = np.r_[0.0, run.states.get("base_vibration_speed", np.zeros(N))[:-1]]
     momentum = MASS * (run.v + base)
     for name in names:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import in_small, twin
+from cli_runs import twin
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
@@ -71,6 +71,14 @@ def test_a_bad_experiment_file_is_refused_in_one_line(fault, tmp_path):
         simulate(PROTON, load_experiment(tmp_path / "e.toml"), simulator=ReducedSimulator)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value) or "TOML" in said
+
+
+def test_the_command_runs_an_experiment_file_and_keeps_it_in_the_log(tmp_path):
+    save_experiment(EXPERIMENTS[1], tmp_path / "next.toml")
+    done = twin("simulate", "next.toml", "--model", "proton_xy", "-o", "l.mcap", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    kept = read_log(tmp_path / "l.mcap").attachments["experiment.toml"]
+    assert kept == (tmp_path / "next.toml").read_bytes()
 
 
 BAD_INPUT = (

@@ -27,7 +27,7 @@ def write_hdf5(path: Path) -> None:
 
 def write_parquet(path: Path) -> None:
     pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    column = pyarrow.nulls(60_000_000, pyarrow.float64())
+    column = pyarrow.nulls(20_000_000, pyarrow.float64())
     parquet.write_table(pyarrow.table({"q": column}), path)
 
 

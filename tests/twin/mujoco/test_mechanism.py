@@ -30,7 +30,7 @@ def smooth_motion(step: float, count: int) -> tuple[np.ndarray, np.ndarray, np.n
 
 def test_momentum_form_is_the_inverse_dynamics():
     step = 1e-3
-    q, v, a = smooth_motion(step, 400)
+    q, v, a = smooth_motion(step, 60)
     mechanism = mechanism_of(ARM, "arm.xml", OWN)
     momentum, force = mechanism.along(q, v, v)
     # Of fourth order: a difference of second order would be the larger error.
