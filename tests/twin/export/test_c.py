@@ -115,17 +115,6 @@ def test_c_of_an_axis_that_feels_the_other_one(tmp_path, name) -> None:
     assert np.ptp(found - run(made, code, "x", own, np.zeros_like(own))) > 0.0
 
 
-@needs_compiler
-def test_a_current_is_the_force_over_its_constant(alone) -> None:
-    _, code = alone
-    states = np.zeros((2, 200))
-    for function in ("force", "current"):
-        getattr(code, f"alone_cogging_{function}").restype = ctypes.c_double
-    numbers = [ctypes.c_double(v) for v in (0.02, 0.1, 3.0)]
-    force = code.alone_cogging_force(*given(states[0]), *numbers)
-    assert code.alone_cogging_current(*given(states[1]), *numbers) == force / 20.0
-
-
 @pytest.mark.parametrize("axis", [n for n in AXES if n not in OF_TWO])
 def test_under_its_feedforward_the_equation_of_motion_holds(axis) -> None:
     """Along moves, and with all effects, the lost ones apart, mass x acceleration is the force."""

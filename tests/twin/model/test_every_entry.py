@@ -81,20 +81,28 @@ def changed(document: Any, path: tuple[Any, ...], value: Any) -> Any:
     return copied
 
 
-def test_every_entry_of_a_model_with_everything_wrong() -> None:
+def test_every_entry_of_a_model_with_everything_wrong():
+    """Where a number stands, nothing passes but a finite number, or none where it has a default."""
     document = complete()
     parse_model(document, CATALOGUE, None, "m.toml")
-    answers = [
-        answer(lambda p=path, v=value: parse_model(changed(document, p, v), CATALOGUE, None, "m"))
-        for path in places(document)
-        for value in WRONG
-    ]
-    refused = [a for a in answers if a is not None]
-    assert len(refused) > 1000
-    for text in refused:
-        assert text.startswith("m: ")
-        assert "\n" not in text
-        assert len(text) < 800
+    refused, numbers = 0, 0
+    for path in places(document):
+        number = isinstance(value_at(document, path), float) and path[0] != "history"
+        numbers += number
+        for value in WRONG:
+            text = answer(
+                lambda p=path, v=value: parse_model(changed(document, p, v), CATALOGUE, None, "m")
+            )
+            if text is None:
+                allowed = value is None or (type(value) in (int, float) and abs(value) < 1e308)
+                assert allowed or not number, (path, value)
+                continue
+            refused += 1
+            assert text.startswith("m: ")
+            assert "\n" not in text
+            assert len(text) < 800
+    assert refused > 1000
+    assert numbers > 20
 
 
 def answer(load: Callable[[], object]) -> str | None:
@@ -104,19 +112,6 @@ def answer(load: Callable[[], object]) -> str | None:
     except InputError as error:
         return str(error)
     return None
-
-
-def test_no_wrong_type_passes_for_a_number() -> None:
-    document = complete()
-    numbers = [
-        path for path in places(document)
-        if isinstance(value_at(document, path), float) and path[0] != "history"
-    ]  # fmt: skip
-    assert len(numbers) > 20
-    for path in numbers:
-        for value in (True, False, "1", [1.0], {"a": 1.0}, math.nan, -math.inf, 10**400):
-            with pytest.raises(InputError):
-                parse_model(changed(document, path, value), CATALOGUE, None, "m.toml")
 
 
 def value_at(document: Any, path: tuple[Any, ...]) -> Any:

@@ -91,20 +91,6 @@ def test_sensors_read_the_joints_and_motors_take_newtons_up_to_their_limit(model
     np.testing.assert_array_equal(data.actuator_force, [200.0, -150.0])
 
 
-def test_steps_at_the_control_rate_and_lets_passive_forces_in(model: mujoco.MjModel) -> None:
-    assert model.opt.timestep == 1e-4
-    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
-    disabled = mujoco.mjtDisableBit
-    assert model.opt.disableflags & disabled.mjDSBL_CONTACT
-    # With springs and dampers both off MuJoCo skips the passive callback; limits need constraints.
-    needed = (
-        disabled.mjDSBL_SPRING | disabled.mjDSBL_DAMPER | disabled.mjDSBL_ACTUATION
-        | disabled.mjDSBL_SENSOR | disabled.mjDSBL_CONSTRAINT | disabled.mjDSBL_LIMIT
-        | disabled.mjDSBL_CLAMPCTRL
-    )  # fmt: skip
-    assert not model.opt.disableflags & needed
-
-
 def test_joint_limits_stop_the_axes(model: mujoco.MjModel) -> None:
     data = mujoco.MjData(model)
     data.ctrl[:] = [20.0, -20.0]

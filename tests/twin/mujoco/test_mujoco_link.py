@@ -92,12 +92,6 @@ def test_a_restored_snapshot_continues_to_the_bit(friction: Effect) -> None:
         np.testing.assert_array_equal(step(stage, 120, 400), first)
 
 
-def test_a_reset_starts_again(stage: MujocoSimulator) -> None:
-    first = step(stage, 0, 200)
-    mujoco.mj_resetData(stage.model, stage.data)
-    np.testing.assert_array_equal(step(stage, 0, 200), first)
-
-
 def test_going_back_in_time_alone_forgets_the_effects_states(stage: MujocoSimulator) -> None:
     start = state(stage, PHYSICS)
     first = step(stage, 0, 200)
