@@ -259,6 +259,16 @@ def test_a_fault_is_told_from_its_threshold_on_with_place_and_size(name):
         assert places[: len(case.where)] == pytest.approx(case.where, abs=0.012)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_a_jump_is_possible_up_to_what_acceleration_and_noise_explain(noise):
+    """Four times the usual acceleration over a sample, and ten times the noise of a bend."""
+    axis = axis_of(added("position", slice(None), WHITE[:4000])(noise))
+    usual = np.quantile(np.abs(axis.acceleration), 0.99) / 1e6
+    bend = 6**0.5 * max(noise, axis.position_step / 12**0.5)
+    assert axis.possible_jump == pytest.approx(4.0 * usual + 10.0 * bend, rel=0.06)
+    assert not axis.jumps.any()
+
+
 @pytest.mark.parametrize(("apart", "where"), [(40, "2 to 2.1 s"), (70, "2 to 2.03 s and 1 more")])
 def test_bursts_that_are_more_than_fifty_milliseconds_apart_are_two(apart, where):
     twice = np.concatenate([BURST, np.zeros(apart), BURST])
