@@ -141,9 +141,6 @@ def test_from_twelve_places_and_one_a_second_on_it_is_the_clock(count, seconds, 
         assert found.where.endswith(f"{count - 1} more times")
 
 
-# Held values, and what is beside them
-
-
 @pytest.mark.parametrize("count", [2, 20])
 def test_a_signal_that_is_held_changes_at_every_few_samples(count):
     signal = np.sin(0.01 * np.arange(4000.0))

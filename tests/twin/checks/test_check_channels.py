@@ -17,8 +17,6 @@ def test_a_sound_drive_gives_no_finding(rate):
     assert check_log(drive(rate, signals=FIELDS)).findings == ()
 
 
-# Units and signs
-
 UNKNOWN = "a scale or the sample rate is wrong"
 THOUSAND = "it looks like a unit a thousand times smaller, as mm for m"
 LOOKS = (
@@ -92,8 +90,6 @@ def test_a_force_against_the_acceleration_states_the_mass_it_looks_like(units, w
     assert found.what.endswith(words)
 
 
-# Lags
-
 FORCE, POSITION = ("position", "force"), ("position", "force", "setpoint_position")
 SPEED = ("position", "force", "velocity")
 WARNING, ERROR = Severity.WARNING, Severity.ERROR
@@ -140,9 +136,6 @@ def test_a_channel_that_is_late_is_told_with_the_remedy(rate, name, late, severi
     assert found[0].severity is severity
 
 
-# Swapped axes
-
-
 @pytest.mark.parametrize(("what", "beside"), [("force", 4), ("position", 0)])
 def test_channels_that_are_swapped_are_told_by_what_was(what, beside):
     """And no pair of other axes with them."""
@@ -174,9 +167,6 @@ def test_channels_that_are_swapped_are_told_by_what_was(what, beside):
     assert crossing < 10.0 < 50.0 < own
     assert told.remedy == f"exchange the columns of the {what}s of both axes in the import map"
     assert found(what, kind=ROTARY_UNITS) == []  # newtons are no newton metres
-
-
-# What every check needs
 
 
 @pytest.mark.parametrize("name", ["position", "force"])

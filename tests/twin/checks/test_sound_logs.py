@@ -62,8 +62,6 @@ def test_the_emps_drive_is_clean(shared_data: Path, file: str) -> None:
     assert check_log(import_log(shared_data / "emps" / file, load_mapping(EMPS_MAP))).findings == ()
 
 
-# True machines of a few lines: a soft loop, friction with a memory, one count
-
 RATE, FINER = 1000.0, 4  # Hz, of the loop; steps of the integration a sample
 INERTIA, VISCOUS = 0.02, 0.02  # kg m^2, N m s/rad
 COUNT = 2.0 * np.pi / 4096  # rad

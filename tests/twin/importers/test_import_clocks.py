@@ -103,8 +103,6 @@ def test_a_damaged_json_file_is_one_line(tmp_path: Path, text: str) -> None:
     assert "\n" not in str(refused.value)
 
 
-# Several files of one recording
-
 TWO = """
 resample = 1000.0
 [[files]]

@@ -285,9 +285,6 @@ force = {{column = "u", unit = "N"}}
     assert axis.force.tolist() == (rows + 50.0).tolist()
 
 
-# Tables
-
-
 @pytest.mark.parametrize("shape", [(2, 5), (5, 2), (1, 5), (5, 1), (2, 2)])
 def test_a_matrix_is_split_along_its_shorter_side(shape):
     """A square one into its columns."""

@@ -150,8 +150,6 @@ def test_a_force_asks_for_no_constant_and_what_is_used_is_not_listed(tmp_path):
     assert "not used" not in text
 
 
-# What is assumed
-
 COLUMNS = {"t [s]": T, "position": Q, "force [N]": F, "temperature": 20.0 + 0.0 * T}
 
 
