@@ -1,7 +1,5 @@
 """Work in an isolated process gives its answer, its refusal, or why there is none."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

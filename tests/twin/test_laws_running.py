@@ -1,7 +1,5 @@
 """Laws of a run: its parts are its whole, what broke it is named, and what a user gives is read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from constructed import effect, two_waves

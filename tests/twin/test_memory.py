@@ -1,7 +1,5 @@
 """Memory that was freed is everybody's: no thread keeps its own."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import sys

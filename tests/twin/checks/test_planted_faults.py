@@ -4,8 +4,6 @@ One axis later than the other in all its columns, the setpoint too, is not among
 shows it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache

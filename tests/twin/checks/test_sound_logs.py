@@ -3,8 +3,6 @@
 Beside each of these machines the fault that it looks like is still found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

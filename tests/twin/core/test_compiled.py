@@ -1,8 +1,6 @@
 """Machine code kept on disk is never older than the source: not the function's own, nor what is
 compiled into it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

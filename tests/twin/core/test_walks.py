@@ -1,7 +1,5 @@
 """Walks of the laws along a motion agree: for several sets of parameters, for columns."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from effect_runs import CATALOGUE

@@ -1,7 +1,5 @@
 """The equation that an effect states is read as people write it, or refused as words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

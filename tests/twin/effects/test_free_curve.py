@@ -1,7 +1,5 @@
 """A free curve lies over the coordinate that a law declares, closed where the law repeats."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

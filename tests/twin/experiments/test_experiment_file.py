@@ -1,7 +1,5 @@
 """Experiment files, setpoints as CSV, and the command that plans one and simulates it."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 

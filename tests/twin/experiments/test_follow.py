@@ -1,7 +1,5 @@
 """What a machine would record of a run, and of one that follows a recorded reference."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Times, speeds, spans and forces are read off the setpoint by counting samples.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
 from itertools import pairwise

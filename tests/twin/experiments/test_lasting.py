@@ -1,7 +1,5 @@
 """An experiment lasts what was asked, and where its moves take longer, that is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

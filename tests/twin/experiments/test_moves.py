@@ -1,7 +1,5 @@
 """Single moves against Ruckig's own evaluation and closed forms; limits met from both sides."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The exported C gives the feedforward of the model, and that makes the model follow."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 from dataclasses import replace

@@ -3,8 +3,6 @@
 That the laws of the catalogue do the same in C is seen by the feedforward of each.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from math import floor

@@ -1,7 +1,5 @@
 """The FMU is a whole one, and what it gives step by step is the feedforward of the model."""
 
-from __future__ import annotations
-
 import ctypes
 import io
 import re

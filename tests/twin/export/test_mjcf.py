@@ -1,7 +1,5 @@
 """The user's own MJCF file, with the friction that was found, moves as the machine did."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mujoco

@@ -1,7 +1,5 @@
 """Tables hold what they say they hold, and what they lose is told in N."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A small file that announces a large table costs neither time nor memory."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 from struct import pack

@@ -1,7 +1,5 @@
 """Uneven time stamps and several files onto one clock, JSON, and when a recording began."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recordings of other programs: TwinCAT Scope, MCAP of other writers."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

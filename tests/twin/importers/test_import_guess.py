@@ -1,7 +1,5 @@
 """A proposed map reads the file that it was proposed for, and says what it assumes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Signals of coupled motors become those of the joints, and no power is lost on the way."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A small file may not cost much time or memory, whatever it announces."""
 
-from __future__ import annotations
-
 import resource
 import struct
 import time

@@ -1,7 +1,5 @@
 """A log is read in part or part by part: only the chunks of what is asked for, and no other."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

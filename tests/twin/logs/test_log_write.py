@@ -1,7 +1,5 @@
 """What is written appears whole or not at all, also while it grows; what is no log is refused."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Any machine: one axis or three, linear or rotary, goes round the whole loop in its own units."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

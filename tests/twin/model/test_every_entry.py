@@ -1,7 +1,5 @@
 """Every entry of a model and of an experiment with every wrong type, value and nesting."""
 
-from __future__ import annotations
-
 import copy
 import datetime
 import json

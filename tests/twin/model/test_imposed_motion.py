@@ -1,7 +1,5 @@
 """A motion that is imposed: no mass to move, and the force that the motion takes is measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A rotary axis: its entries, its inertia and its hinge, and the counterparts of linear units."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 That attached bodies have their masses and springs is what makes both simulations agree.
 """
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Momentum and bias force of a mechanism's bodies are those of MuJoCo's own inverse dynamics."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

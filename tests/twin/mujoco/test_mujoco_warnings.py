@@ -1,7 +1,5 @@
 """A simulation that breaks down ends, and says when, on which axis and by which effect."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir
 from math import nan, sqrt

@@ -1,7 +1,5 @@
 """A body's inertia is written into the user's own file, and nothing else of it changes."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest
