@@ -83,12 +83,3 @@ def test_a_burst_does_not_hide_a_lag() -> None:
     report = check_log(with_axis(both, "x", late(500, "force", "current")))
     assert faults(report) == {Fault.LAG, Fault.OUTLIERS}
     assert milliseconds(only(report, Fault.LAG)) == pytest.approx(50.0, abs=0.3)
-
-
-def test_a_finding_is_one_sentence_with_axis_place_and_remedy() -> None:
-    report = check_log(with_axis(clean_log(), "y", late(500, "force", "current")))
-    assert re.fullmatch(
-        r"axis y, whole log: the force is \S+ ms \(\d+ samples\) behind the motion that it causes; "
-        r"give force delay_samples = \d+ in the import map",
-        str(only(report, Fault.LAG)),
-    )

@@ -44,14 +44,6 @@ def test_samples_equal_ruckigs_own_evaluation(target: tuple[float, float]) -> No
             np.testing.assert_allclose(signal[k], expected, rtol=1e-9, atol=1e-11)
 
 
-def test_a_move_takes_the_shortest_time_its_limits_allow() -> None:
-    limits = LIMITS[0]
-    phases = move([limits], np.array([0.0]), np.array([0.12]))
-    assert phases.total == pytest.approx(0.12 / 0.25 + limits.ramp_time(0.25), rel=1e-12)
-    tiny = move([limits], np.array([0.1]), np.array([0.1 + 4e-6]))
-    assert tiny.total == pytest.approx((32 * 4e-6 / limits.jerk) ** (1 / 3), rel=1e-9)
-
-
 @pytest.mark.parametrize("distance", [1e-9, 0.3])
 def test_moves_of_every_size_end_on_their_target(distance: float) -> None:
     target = np.array([0.05 + distance, -0.05 + distance / 3])

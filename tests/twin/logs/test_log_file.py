@@ -15,7 +15,7 @@ import zstandard
 from log_cases import assert_same_log, two_axes
 from mcap import records as kinds
 from mcap.opcode import Opcode
-from mcap.reader import NonSeekingReader, make_reader
+from mcap.reader import make_reader
 from mcap_bytes import of, parsed, parsed_message, pieces, records
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -178,13 +178,6 @@ def test_metadata_attachments_and_channels_say_what_the_log_holds(data):
         "force_constant": "3.5",
     }  # fmt: skip
     assert channels[3] == {"axis": "x", "sample_rate_hz": "3000.0", "unit.position": "m"}
-
-
-def test_stock_readers_accept_every_checksum_and_find_samples_by_time(data):
-    reader = NonSeekingReader(BytesIO(data), validate_crcs=True)
-    assert sum(1 for _ in reader.iter_messages()) == 4 * COUNT
-    last = make_reader(BytesIO(data)).iter_messages("/axis/y", starting_at=exact(COUNT - 1, RATE))
-    assert [m.sequence for _, _, m in last] == [COUNT - 1]
 
 
 @pytest.mark.parametrize("rows", [0.5, 2, 44, 45])

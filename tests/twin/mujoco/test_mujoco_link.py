@@ -10,7 +10,6 @@ from effect_runs import CATALOGUE, FRICTIONS, with_all
 from mujoco.batch import Batch
 
 from twin.effect import Effect
-from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.mujoco.callback import passive_callback
@@ -98,16 +97,6 @@ def test_going_back_in_time_alone_forgets_the_effects_states(stage: MujocoSimula
     mujoco.mj_setState(stage.model, stage.data, start, PHYSICS)  # userdata is not part of it
     again = step(stage, 0, 200)
     np.testing.assert_array_equal(again[:, : len(start)], first[:, : len(start)])
-
-
-def test_the_same_seed_gives_the_same_bytes() -> None:
-    one, two, other = (simulate(everything(), "moves", seed=s, duration=0.3) for s in (7, 7, 8))
-    for axis in one.axes:
-        for name, column in one.axes[axis].columns.items():
-            assert column.tobytes() == two.axes[axis].columns[name].tobytes()
-        for name, column in one.truth[axis].items():
-            assert column.tobytes() == two.truth[axis][name].tobytes()
-        assert other.axes[axis].force.tobytes() != one.axes[axis].force.tobytes()
 
 
 def test_batch_on_two_threads_is_stepping_serially(stage: MujocoSimulator) -> None:
