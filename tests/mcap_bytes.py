@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import struct
 import zlib
 from collections.abc import Iterable, Mapping
@@ -20,7 +19,6 @@ from mcap.records import (
     McapRecord,
     Message,
     Metadata,
-    Schema,
 )
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -98,15 +96,3 @@ def json_channel(
 ) -> Channel:
     """A channel of JSON messages."""
     return Channel(number, topic, "json", dict(metadata or {}), schema)
-
-
-def json_schema(number: int, name: str = "S", data: bytes = b"{}") -> Schema:
-    """A schema that a JSON channel may name."""
-    return Schema(number, data, "jsonschema", name)
-
-
-def json_message(
-    channel: int, time: int, values: Mapping[str, object], sequence: int = 0
-) -> Message:
-    """A message of named values at a time in ns."""
-    return Message(channel, time, json.dumps(values).encode(), time, sequence)

@@ -11,7 +11,7 @@ from axis_runs import effect
 from twin.errors import InputError
 from twin.model.file import load_model, models_folder
 from twin.model.machine import AxisModel, MachineModel
-from twin.mujoco.mjcf import Spring, machine_spec
+from twin.mujoco.mjcf import Spring, attached_joint, machine_spec
 
 PERIOD = 2e-4  # s
 STAGE = load_model("proton_xy")
@@ -20,6 +20,16 @@ STAGE = load_model("proton_xy")
 def plain(*masses: float, rotary: bool = False) -> MachineModel:
     axes = {n: AxisModel(m, rotary=rotary) for n, m in zip("xyz", masses, strict=False)}
     return MachineModel("plain", axes, 1.0 / PERIOD)
+
+
+def mass_felt(model: mujoco.MjModel, joint: str) -> float:
+    """By a force on that joint, with all others held: kg."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    whole = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, whole)
+    dof = model.joint(joint).dofadr[0]
+    return float(whole[dof, dof])
 
 
 @pytest.mark.parametrize(("frequency", "ratio"), [(0.5, 0.0), (40.0, 0.6), (700.0, 0.05)])
@@ -41,6 +51,21 @@ def test_a_spring_beyond_the_sampling_rate_is_held_where_the_step_is_stable(freq
     assert spring.stiffness <= 2.0 * (1.0 - share) / PERIOD**2
     limit = Spring.of(share, 1e9, 0.05, PERIOD)
     assert spring == limit or frequency < 3.0 / (2.0 * np.pi * PERIOD)
+
+
+@pytest.mark.parametrize("recoils", [(0.6, 0.1), (0.2, 0.35)])
+def test_a_frame_on_springs_both_ways_has_the_mass_of_each_way(recoils):
+    """One body for both: what one way is heavier stands on that joint alone, never below 0."""
+    machine = STAGE
+    for axis, recoil in zip("xy", recoils, strict=True):
+        standing = effect("base_vibration", recoil=recoil)
+        machine = machine.with_axis(axis, machine.axes[axis].with_effect(standing))
+    model = machine_spec(machine).compile()
+    for axis, recoil in zip("xy", recoils, strict=True):
+        felt = mass_felt(model, attached_joint(axis, "base_vibration"))
+        assert felt == pytest.approx(STAGE.axes[axis].mass / recoil)
+    assert np.all(model.dof_armature >= 0.0)
+    assert np.count_nonzero(model.dof_armature > 1e-9) == 1
 
 
 def test_axes_without_a_file_are_slides_and_hinges_in_turn() -> None:
