@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from axis_runs import BOTH, Stepper
 from effect_runs import CATALOGUE
 
 from twin.effect import (
@@ -28,9 +29,8 @@ from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted
-from twin.simulator import MujocoSimulator, ReducedSimulator
 
-BOTH = pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
+EACH = pytest.mark.parametrize("stage", BOTH)
 
 
 def note_time_and_axis(p, s, io):
@@ -44,9 +44,7 @@ def note_other_axis(p, s, io):
     io[OUT] = p[0]
 
 
-def noted(
-    law, names: tuple[str, ...], stage: type[MujocoSimulator] | type[ReducedSimulator]
-) -> Log:
+def noted(law, names: tuple[str, ...], stage: Stepper) -> Log:
     """A log of the stage with an effect on x that notes io in its states, and adds 0.5 N."""
     spy = Effect(
         kind=Kind.ACTUATION if "u" in names else Kind.FORCE,
@@ -63,8 +61,8 @@ def column(log: Log, name: str) -> np.ndarray:
     return log.truth["x"][f"test_physics_axis_io_{name}"]
 
 
-@BOTH
-def test_a_law_is_told_of_its_axis(stage: type[MujocoSimulator] | type[ReducedSimulator]) -> None:
+@EACH
+def test_a_law_is_told_of_its_axis(stage: Stepper) -> None:
     names = ("index", "time", "dt", "mass", "x", "v", "u", "hold")
     log = noted(note_time_and_axis, names, stage)
     true, n = log.truth["x"], np.arange(len(log))
@@ -82,7 +80,7 @@ def test_a_law_is_told_of_its_axis(stage: type[MujocoSimulator] | type[ReducedSi
     np.testing.assert_allclose(column(log, "hold"), hold, rtol=1e-12)
 
 
-@BOTH
+@EACH
 def test_a_law_is_told_of_the_other_axis(stage):
     log = noted(note_other_axis, ("x", "v", "a", "friction"), stage)
     other = log.truth["y"]

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 from arms import ARM, COULOMB, JOINTS, VISCOUS, arm_of
+from axis_runs import effect as fitted
 from cli_runs import refusal, twin
-from effect_runs import CATALOGUE
 
 from twin.export.formats.mjcf import attributes_of, export
 from twin.model.file import save_model
@@ -16,10 +16,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 COMMENTED = ARM.replace(
     '<joint name="elbow"', "<!-- <joint name='elbow'/> as drawn -->\n          <joint name='elbow'"
 ).replace('name="base" axis', 'name="base" damping="7"\n   frictionloss="2" armature="0.5" axis')
-
-
-def fitted(effect: str, **values: float) -> Fitted:
-    return Fitted.at_start(CATALOGUE[effect], values)
 
 
 def model(text: str = COMMENTED, **more: Fitted) -> MachineModel:

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from axis_runs import effect as fitted
 from cli_runs import refusal, twin
-from effect_runs import CATALOGUE
 from strict_json import valid
 
 from identify.testing import assert_exported
@@ -24,10 +24,6 @@ from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 HARDWARE = Hardware(
     travel=(-0.1, 0.1), force_constant=20.0, velocity=0.2, acceleration=2.0, jerk=50.0
 )
-
-
-def fitted(effect: str, **values: float) -> Fitted:
-    return Fitted.at_start(CATALOGUE[effect], values)
 
 
 PLAIN = (

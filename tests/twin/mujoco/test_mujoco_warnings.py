@@ -9,16 +9,16 @@ from threading import Barrier
 import mujoco
 import numpy as np
 import pytest
-from axis_runs import effect
+from axis_runs import BOTH, effect
 
 from twin.effect import OUT, Effect, Kind, Parameter, X
 from twin.errors import CannotRun
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.mujoco.callback import collected_warnings
-from twin.simulator import MujocoSimulator, ReducedSimulator, run
+from twin.simulator import run
 
-BOTH = pytest.mark.parametrize("simulator", [MujocoSimulator, ReducedSimulator])
+EACH = pytest.mark.parametrize("simulator", BOTH)
 
 
 def _law(p, s, io):  # type: ignore[no-untyped-def]
@@ -55,7 +55,7 @@ def ramp() -> Setpoint:
     return Setpoint(position, np.full_like(position, 0.1), still, still, 1000.0)
 
 
-@BOTH
+@EACH
 def test_a_law_that_breaks_in_the_travel_ends_the_run(simulator: type, tmp_path: Path) -> None:
     with chdir(tmp_path), pytest.raises(CannotRun) as refused:
         run(machine({}), ramp(), np.random.default_rng(0), simulator=simulator)
@@ -66,7 +66,7 @@ def test_a_law_that_breaks_in_the_travel_ends_the_run(simulator: type, tmp_path:
     assert list(tmp_path.iterdir()) == []  # no MUJOCO_LOG.TXT
 
 
-@BOTH
+@EACH
 def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
     with pytest.raises(
         CannotRun, match=r"t = 0\.0000 s on axis y: effect test_mujoco_warnings gives nan N"
@@ -74,7 +74,7 @@ def test_a_force_that_is_no_number_from_the_start(simulator: type) -> None:
         run(machine({"a": nan}), ramp(), np.random.default_rng(0), simulator=simulator)
 
 
-@BOTH
+@EACH
 @pytest.mark.parametrize(("axis", "largest"), [("x", "viscous_friction"), ("y", "spring")])
 def test_a_loop_that_swings_up_is_told_with_its_axis_and_the_largest_force_there(
     simulator, axis, largest

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from axis_runs import BOTH, Stepper
 from effect_runs import CATALOGUE, with_all
 
 from twin.core.control import Controller
@@ -28,8 +29,6 @@ def smooth(model: MachineModel) -> MachineModel:
 
 
 STAGE = smooth(load_model("proton_xy", CATALOGUE))
-Stepper = type[MujocoSimulator] | type[ReducedSimulator]
-BOTH = pytest.mark.parametrize("stage", [MujocoSimulator, ReducedSimulator])
 
 
 def simulated(model: MachineModel, stage: Stepper, experiment: str) -> Log:
@@ -81,7 +80,7 @@ def test_both_simulations_agree_without_a_mujoco_file() -> None:
     require_parity(with_all(model, np.random.default_rng(23)))
 
 
-@BOTH
+@pytest.mark.parametrize("stage", BOTH)
 def test_true_position_is_the_closed_form_of_a_force_held_over_samples(stage: Stepper) -> None:
     mass, rate, n, held = 3.7, 1000.0, 7000, 7
     levels = np.random.default_rng(24).normal(0.0, 5.0, n // held)
