@@ -1,7 +1,7 @@
 """Laws of the low-pass, the lag and the rough dynamics that the checks of a log rest on.
 
-The noise of a linear map is the norm of one of its rows; a lag that is put in is the lag that is
-found. What the low-pass gives is seen by the sizes that the checks state.
+Polynomials pass a symmetric low-pass in closed form; the noise of a linear map is the norm of one
+of its rows; a lag that is put in is the lag that is found.
 """
 
 import numpy as np
@@ -10,6 +10,27 @@ import pytest
 from twin.checks.explain import Smoother, find_lag, fit_dynamics
 
 KEPT = np.ones(6000)
+
+
+@pytest.mark.parametrize("rate", [200.0, 1500.0])
+def test_lines_and_parabolas_pass_in_closed_form(rate):
+    """x = a + b t + c t^2: position a + b t, velocity b + 2 c t, acceleration 2 c, at time()."""
+    smoother = Smoother(1.0 / rate)
+    t = np.arange(round(0.5 * rate) + 3) / rate
+    a, b, c = 0.3, -1.7, 2.9
+    line, parabola = a + b * t, a + b * t + c * t**2
+    at = smoother.time(np.arange(len(smoother.position(line))))
+    for found, wanted in (
+        (smoother.position(line), a + b * at),
+        (smoother.velocity(parabola), b + 2.0 * c * at),
+        (smoother.acceleration(parabola)[1:-1], np.full(len(at) - 2, 2.0 * c)),
+        # a held signal acts from its sample on: over a block its mean is half a sample early
+        (smoother.held(line), a + b * (at - 0.5 / rate)),
+        (smoother.rate(line), a + b * at),
+        (smoother.direction(b * t, 0.1), np.full(len(at), np.tanh(b / 0.1))),
+    ):
+        assert len(found) == len(wanted)
+        np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [200.0, 1500.0])
