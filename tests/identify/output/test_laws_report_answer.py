@@ -41,9 +41,6 @@ def page_of(subject: Subject) -> Page:
     return Page(page(subject.title, facts(subject), shown))
 
 
-# --- the answer -----------------------------------------------------------------------------
-
-
 def cards(diagnosis=None, **changes):
     return [card for view in subject_of(diagnosis, **changes).views for card in cards_of(view)]
 
@@ -93,15 +90,6 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     assert card.remarks[2].startswith("Together they explain 98 % of the squared error above")
 
 
-def test_an_effect_that_a_missing_one_resembles():
-    like = replace(made.FOUND[0], kind=FindingKind.RESEMBLES)
-    card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(like, made.FOUND[1]))))
-    assert card.headline == (
-        "Axis x: something like cogging or quadratic drag, and lugre are missing"
-    )
-    assert card.remarks[0].startswith("What is missing resembles cogging, in another shape; that ")
-
-
 def test_the_answer_for_what_nothing_explains():
     lost = made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
     card, _ = cards(replace(made.diagnosed(lost), left_over={}))
@@ -125,11 +113,18 @@ def test_the_answer_for_one_effect_without_held_out_logs():
         replace(made.TRIALS[0], gain=1.0),))}))  # fmt: skip
     assert card.headline == "Axis x: cogging is missing"
     assert "comes nearest to deciding, but is too short" in card.remarks[1]
+    assert [t.name for t in card.tiles][1] == "Force error, cross-validated"
     logs = "'run 1' 'run 2' --holdout 'held 1'"
     assert card.commands == [f"twin add cogging MODEL {logs} -o better.toml"]
 
 
-def test_what_the_test_logs_contradict_stands_in_the_headline():
+def test_what_is_only_like_an_effect_or_contradicted_stands_in_the_headline():
+    like = replace(made.FOUND[0], kind=FindingKind.RESEMBLES)
+    card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(like, made.FOUND[1]))))
+    assert card.headline == (
+        "Axis x: something like cogging or quadratic drag, and lugre are missing"
+    )
+    assert card.remarks[0].startswith("What is missing resembles cogging, in another shape; that ")
     against = replace(made.FOUND[0], tied=(), tested=made.errors(2.17, 2.29, Role.TEST)[0])
     card, _ = cards(made.diagnosed(made.diagnosis_of(findings=(against,))))
     assert card.headline == ("Axis x: cogging is missing (not confirmed by the test logs: cogging)")
@@ -137,19 +132,13 @@ def test_what_the_test_logs_contradict_stands_in_the_headline():
     assert card.commands == []
 
 
-def test_cross_validated_errors_have_a_tile_of_their_own():
-    one = made.diagnosis_of(
-        findings=made.FOUND[:1], dataset=replace(made.DATASET, holdout=()), on=Role.TRAINING
-    )
-    card, _ = cards(made.diagnosed(one))
-    assert [t.name for t in card.tiles][1] == "Force error, cross-validated"
-
-
 @pytest.mark.parametrize(("error", "tone"), [(1.29, Tone.PLAIN), (1.31, Tone.STRONG)])
 def test_a_comparison_alone_says_whether_the_error_is_noise(error, tone):
     c = made.comparison_of()
     c = replace(c, residual=c.residual * (error * c.floor / c.total_error))
-    (card,) = cards_of(Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ()).views[0])
+    (view,) = Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ()).views
+    (card,) = cards_of(view)
+    assert bool(regions(view)) is (tone is Tone.STRONG)
     assert card.tone is tone
     assert ("explains the measurement" in card.headline) is (tone is Tone.PLAIN)
     assert ("at its noise floor" in card.sentence) is (tone is Tone.PLAIN)
@@ -158,7 +147,21 @@ def test_a_comparison_alone_says_whether_the_error_is_noise(error, tone):
     assert (tone is Tone.PLAIN) or f"force error {number(error)} times" in card.headline
 
 
-# --- regions, notes, facts ------------------------------------------------------------------
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
+    first, *rest = cards(additions=(replace(made.addition(), kept=True), made.addition(kept)))
+    assert len(rest) == 2
+    assert first.headline == "Axis x: cogging added"
+    assert [(t.name, t.value) for t in first.tiles] == [
+        ("Force error, training logs", "7.31 -> 4.57 N"),
+        ("Force error, selection logs", "7.83 -> 4.91 N"),
+        ("Position, free run", "3.71 -> 1.93 µm"),
+    ]  # fmt: skip
+    assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
+    assert (first.tone is Tone.STRONG) is kept
+    assert (first.sentence == "The logs prove the effect.") is kept
+    assert ("gain uncertain: t = 1.3, where 1.6 is sure" in first.sentence) is not kept
+    assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
 
 
 def test_the_worst_regions_are_in_the_order_of_what_is_printed():
@@ -172,18 +175,21 @@ def test_the_worst_regions_are_in_the_order_of_what_is_printed():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "said"),
-    [(0.0, 1.5, "moving forwards"), (-1.5, 0.0, "moving backwards")],
+    ("changed", "said"),
+    [
+        ({"low": 0.0, "high": 1.5}, "moving forwards"),
+        ({"low": -1.5, "high": 0.0}, "moving backwards"),
+        ({"coordinate": "standstill", "unit": "1", "low": 0.0, "high": 1.0}, "in motion"),
+        ({"coordinate": "standstill", "unit": "1", "low": 1.0, "high": 2.0}, "at standstill"),
+        (
+            {"coordinate": "position", "unit": "m", "low": 0.01131, "high": 0.01157},
+            "position between 11.31 and 11.57 mm",
+        ),
+    ],
 )
-def test_a_direction_is_named(low, high, said):
+def test_a_place_is_named_with_the_digits_of_its_width(changed, said):
     _, back = made.comparison_of().worst
-    assert place_in_words(replace(back, low=low, high=high)) == said
-
-
-def test_a_narrow_region_has_the_digits_of_its_width():
-    near, _ = made.comparison_of().worst
-    narrow = place_in_words(replace(near, low=0.01131, high=0.01157))
-    assert narrow == "position between 11.31 and 11.57 mm"
+    assert place_in_words(replace(back, **changed)) == said
 
 
 def test_regions_have_headings_only_among_several_axes():
@@ -198,14 +204,6 @@ def test_regions_have_headings_only_among_several_axes():
         text = page_of(subject).texts["regions"]
         assert [name for name in ("Axis x", "Axis y") if name in text] == expected
         assert "Where the error is" in text
-
-
-@pytest.mark.parametrize(("ratio", "shown"), [(1.29, False), (1.31, True)])
-def test_regions_are_shown_above_the_noise(ratio, shown):
-    c = made.comparison_of()
-    c = replace(c, residual=c.residual * (ratio * c.floor / c.total_error))
-    subject = Subject("t", None, made.Comparison(made.MODEL, {"x": c}), (), ())
-    assert bool(regions(subject.views[0])) is shown
 
 
 def test_notes_are_said_once():

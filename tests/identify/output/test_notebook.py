@@ -27,30 +27,18 @@ def shown(result: object) -> str:
     return re.sub(r"\s+", " ", outline.text)
 
 
-def test_a_diagnosis_shows_its_answer_its_numbers_and_the_next_command(case: Case) -> None:
+def test_each_result_shows_what_its_text_says(case: Case) -> None:
     text = shown(case.diagnosis)
     assert "Axis x: cogging is missing" in text
     assert typeset(quantity(case.x.tested.before, "N")) in text
-    assert "twin add cogging MODEL 'run 1' --holdout 'run 2' -o better.toml" in text
     assert "cogging.p" in text
     assert "run 1" in shown(case.diagnosis.comparison)
-
-
-def test_a_fit_shows_each_parameter_with_its_interval_or_the_reason(case: Case) -> None:
-    fitted = workflow.fit(case.model, case.fit, case.held)
-    text = shown(fitted)
-    for estimate in fitted.estimates["x"]:
-        assert estimate.label in text
-    assert "No interval: the force error" in text
-    assert "5.31 kg" not in shown(fitted)
-    assert "5.23 to 5.47" in shown(made.fit_result())
-
-
-def test_a_log_shows_the_range_of_each_signal(case: Case) -> None:
     log = case.fit["run 1"]
-    text = shown(log)
-    assert "6 s at 2000 Hz" in text
-    assert f"xpositionm{log.axes['x'].position.min():.4g}" in text
+    assert f"xpositionm{log.axes['x'].position.min():.4g}" in shown(log)
+    text = shown(workflow.fit(case.model, case.fit, case.held))
+    assert "coulomb_viscous.Fc" in text
+    assert "No interval: the force error" in text
+    assert "5.23 to 5.47" in shown(made.fit_result())
 
 
 def test_the_residual_is_drawn_over_the_coordinate_of_the_answer_or_any_other(case: Case) -> None:

@@ -66,9 +66,6 @@ def tiles(text: str) -> dict[str, str]:
     return dict(found)
 
 
-# --- the numbers of the page, read back ------------------------------------------------------
-
-
 def test_a_comparison(case: Case, tmp_path: Path) -> None:
     compared = case.diagnosis.comparison
     text = case.write(tmp_path / "c.html", diagnosis=None, history=(), additions=())
@@ -101,7 +98,9 @@ def test_a_diagnosis(page: Page, text: str, told: dict) -> None:
             row = [*page.table("ranking")[title_case(one["effect"])].values()]
             errors = one["holdout_error_before"], one["holdout_error_after"]
             assert [si(cell) for cell in row[:3]] == near(one["delta_bic"], *errors)
-            assert row[4] == (one["why_not"] or "")
+            why = one["why_not"] or ""
+            assert row[4] == why
+            assert one["supported"] == (why == "" or why.startswith("not needed beside"))
     for name, one in told["parameters"].items():
         cells = page.table("parameters")[name]
         least = 0.05 * np.ptp(one["interval_90"] or [0.0])  # which has two digits
@@ -131,11 +130,15 @@ def test_no_error_of_the_growth_is_below_the_floor_of_its_logs(page: Page) -> No
             assert floor == "–" or si(after) >= (1 - DIGITS) * si(floor)
 
 
-def test_a_fit(case: Case) -> None:
-    fitted = workflow.fit(case.model, case.fit, case.held)
-    own = json_of(fitted)["axes"]["x"]
-    lines = str(fitted).splitlines()
-    for shown in (fitted_table(fitted), fitted_text(lines)):
+@pytest.fixture(scope="module")
+def fit_of_case(case: Case) -> FitResult:
+    return workflow.fit(case.model, case.fit, case.held)
+
+
+def test_a_fit(fit_of_case: FitResult) -> None:
+    own = json_of(fit_of_case)["axes"]["x"]
+    lines = str(fit_of_case).splitlines()
+    for shown in (fitted_table(fit_of_case), fitted_text(lines)):
         assert shown.keys() == own["parameters"].keys()
         for name, one in own["parameters"].items():
             assert si(shown[name]) == pytest.approx(one["value"], rel=DIGITS), name
@@ -152,9 +155,6 @@ def fitted_table(result: FitResult) -> dict[str, str]:
 def fitted_text(lines: list[str]) -> dict[str, str]:
     rows = (line.split() for line in lines if re.match(r"  \S+ {2,}\S", line))
     return {name: typeset(" ".join(rest)) for name, *rest in rows}
-
-
-# --- of the final model, with every effect ---------------------------------------------------
 
 
 def test_laws_parameters_and_curves_are_those_of_the_final_model(case: Case) -> None:
@@ -175,22 +175,11 @@ def test_laws_parameters_and_curves_are_those_of_the_final_model(case: Case) -> 
     np.testing.assert_allclose(left[: len(fit.kept)][kept], fit.residual, atol=1e-12)
 
 
-# --- what is refused is refused everywhere ---------------------------------------------------
-
-
-def test_an_effect_is_supported_exactly_where_nothing_speaks_against_it(told: dict) -> None:
-    for one in told["ranking"]:
-        why = one["why_not"] or ""
-        assert one["supported"] == (why == "" or why.startswith("not needed beside")), one
-
-
 def test_intervals_that_the_text_refuses_are_not_in_the_model_file(
-    case: Case, tmp_path: Path
+    case: Case, fit_of_case: FitResult, tmp_path: Path
 ) -> None:
-    fitted = workflow.fit(case.model, case.fit, case.held)
-    assert "no interval: the force error" in str(fitted)
-    assert not any(e.low for e in fitted.estimates["x"])
-    given = load_written(fitted.model, tmp_path), load_written(case.addition.model, tmp_path)
+    assert "no interval: the force error" in str(fit_of_case)
+    given = load_written(fit_of_case.model, tmp_path), load_written(case.addition.model, tmp_path)
     refused, kept = (set(model.intervals["x"].ends) for model in given)
     assert refused == set()
     assert {"mass", "cogging.p", "cogging.a1"} <= kept
@@ -199,15 +188,6 @@ def test_intervals_that_the_text_refuses_are_not_in_the_model_file(
 def load_written(model: MachineModel, folder: Path) -> MachineModel:
     save_model(model, folder / "m.toml")
     return load_model(folder / "m.toml", load_catalogue())
-
-
-def test_a_text_has_values_with_units_and_the_next_command(case: Case) -> None:
-    said = str(case.diagnosis)
-    found = re.search(r"Found: p = ([\d.]+) mm, a1 = ", said)
-    assert found
-    assert float(found[1]) == pytest.approx(25.0, rel=0.01)
-    assert "\n  next: twin add cogging MODEL 'run 1' --holdout 'run 2' -o better.toml\n" in said
-    assert "LOG..." not in said
 
 
 def test_what_effects_do_alone_and_together_is_said_and_that_more_is_missing(case: Case) -> None:

@@ -41,7 +41,7 @@ def page(shown: tuple[Browser, Path]) -> Iterator[Browser]:
     assert running.requests == [path.resolve().as_uri()]
 
 
-def test_the_answer_comes_first_and_fits_the_window(page: Browser) -> None:
+def test_the_answer_comes_first_fits_the_window_and_its_command_is_copied(page: Browser) -> None:
     box = page.run("""const b = document.querySelector(".answer").getBoundingClientRect();
       const p = document.getElementById("coordinate").getBoundingClientRect();
       return [b.bottom, p.bottom, document.documentElement.scrollWidth];""")
@@ -49,6 +49,9 @@ def test_the_answer_comes_first_and_fits_the_window(page: Browser) -> None:
     assert box[1] < 800
     assert box[2] <= 1280
     assert page.run("return document.querySelectorAll('.plot canvas').length") >= 9
+    copied = page.run("""document.querySelector("[data-copy]").click();
+      await frame(); await frame(); return document.querySelector("[data-copy]").textContent;""")
+    assert copied == "Copied"
 
 
 def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
@@ -150,25 +153,15 @@ def test_the_map_tells_the_error_of_a_cell(page: Browser) -> None:
     assert said[1].startswith("RMS of all logs: from the noise floor")
 
 
-def test_the_command_is_copied(page: Browser) -> None:
-    assert (
-        page.run("""document.querySelector("[data-copy]").click(); await frame(); await frame();
-      return document.querySelector("[data-copy]").textContent;""")
-        == "Copied"
-    )
-
-
-def test_the_page_fits_a_narrow_window(page: Browser, shown: tuple[Browser, Path]) -> None:
-    running, path = shown
-    running.open(path, 400, 800)
-    wide = running.run("""const plots = [...document.querySelectorAll(".plot .uplot")];
+def test_a_narrow_page_fits_its_texts_have_contrast_and_its_controls_names(
+    page: Browser, shown: tuple[Browser, Path]
+) -> None:
+    """WCAG AA: 4.5 to 1 for text, on the background that is behind it."""
+    page.open(shown[1], 400, 800)
+    wide = page.run("""const plots = [...document.querySelectorAll(".plot .uplot")];
       return [document.documentElement.scrollWidth,
         ...plots.map(e => e.getBoundingClientRect().right)]""")
     assert all(one <= 400 for one in wide)
-
-
-def test_texts_have_contrast_and_controls_have_names(page: Browser) -> None:
-    """WCAG AA: 4.5 to 1 for text, on the background that is behind it."""
     found = page.run("""
       const light = c => { const [r, g, b] = c.match(/[\\d.]+/g).slice(0, 3).map(v => v / 255)
         .map(v => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
@@ -187,9 +180,6 @@ def test_texts_have_contrast_and_controls_have_names(page: Browser) -> None:
       return [low, unnamed.map(e => e.outerHTML)];
     """)
     assert found == [[], []]
-
-
-# --- long logs ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -8,26 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_cases import Case, Outline, answers, cogging_case
+from report_cases import Case, Outline, cogging_case
 
 from identify import workflow
-from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import Scale, capitalised, number, quantity, typeset
-from identify.output.report.effects import equations
-from identify.output.report.page import Heading
-from identify.output.report.subject import Subject
-from identify.output.words.diagnosis import verdict_in_words
-from identify.results.results import Diagnosis, summary_of
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 
 
 @pytest.fixture(scope="module")
 def case() -> Case:
     return cogging_case()
-
-
-# --- other conclusions ----------------------------------------------------------------------
 
 
 def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
@@ -37,56 +27,6 @@ def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
     ]  # fmt: skip
     ratio = number(case.diagnosis.comparison.axes["x"].ratio)
     assert f"Axis x: force error {ratio} times the noise floor" in text
-
-
-def ambiguous(case: Case) -> AxisDiagnosis:
-    """The diagnosis of the case, had drag explained as much."""
-    (found,) = case.x.findings
-    return replace(case.x, findings=(replace(found, tied=("quadratic_drag",)),))
-
-
-def test_every_verdict_has_its_words(case: Case) -> None:
-    structure = Dependence(0.63, "position", 0.027, "m", {"position": 0.63})
-    tied = ambiguous(case)
-    lost = replace(case.quiet, verdict=Verdict.UNEXPLAINED, unexplained=structure)
-    done = case.quiet
-    expected = {
-        "Axis x: cogging or quadratic drag is missing": tied,
-        "Axis x: something outside the catalogue is missing": lost,
-        "Axis x: nothing is missing": done,
-    }
-    for headline, found in expected.items():
-        (card,) = answers(case.subject(case.concluding(found)))
-        assert card.headline == headline
-        assert card.sentence.startswith(verdict_in_words(found))
-        assert ("27.0 mm" in card.sentence) == (found is lost)
-        assert ("63 %" in card.sentence) == (found is lost)
-
-
-def test_only_named_effects_have_their_law_printed(case: Case) -> None:
-    tied = ambiguous(case)
-    blocks = equations(case.subject(case.concluding(tied)).views[0])
-    assert [b.text for b in blocks if isinstance(b, Heading)] == [
-        "Cogging on x", "Quadratic drag on x",
-    ]  # fmt: skip
-    assert equations(case.subject(case.concluding(case.quiet)).views[0]) == []
-
-
-def test_the_axis_of_the_answer_comes_first(case: Case) -> None:
-    compared = case.diagnosis.comparison
-    both = replace(
-        compared,
-        model=replace(compared.model, axes=dict.fromkeys("ax", compared.model.axes["x"])),
-        axes={"a": replace(compared.axes["x"], axis="a"), "x": compared.axes["x"]},
-    )
-    axes = {"a": case.quiet, "x": case.x}
-    told = {axis: summary_of(d) for axis, d in axes.items()}
-    diagnosis = Diagnosis(both.model, axes, both, told)
-    cards = answers(Subject("Report", diagnosis, both, (), ()))
-    assert [card.headline[:7] for card in cards] == ["Axis x:", "Axis a:"]
-
-
-# --- names that are not meant well ----------------------------------------------------------
 
 
 def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
@@ -113,21 +53,19 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     assert signals[0]["logs"][0]["title"] == f"{evil} (training)"
 
 
-# --- numbers --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [
         (0.02, "N", "20.0 mN"),
-        (1.234, "N", "1.23 N"),
         (-3.3e-4, "s", "−330 µs"),
         (1e-9, "m", "1.00 nm"),
-        (7.18e-4, "kg", "7.18×10⁻⁴ kg"),
+        (1.234e-3, "kg", "0.00123 kg"),
         (0.018, "N s/m", "0.0180 N·s/m"),
-        (12345.0, "N/m^2", "12345 N/m²"),
         (2.0, "1", "2.00"),
         (0.0, "m", "0 m"),
+        (9.87e-4, "kg", "9.87×10⁻⁴ kg"),
+        (-1.234e7, "N/m^2", "−1.23×10⁷ N/m²"),
+        (1234567.0, "N/m^2", "1234567 N/m²"),
         (4e-17, "N s^2/m^2", "4.00×10⁻¹⁷ N·s²/m²"),
         (None, "N", "–"),
         (float("nan"), "N", "–"),
@@ -150,10 +88,26 @@ def test_a_sentence_of_the_terminal_is_typeset_on_a_page(said: str, printed: str
     assert typeset(capitalised(said)) == printed
 
 
-def test_an_interval_sets_the_digits_of_its_value() -> None:
-    scale = Scale.of("m", [0.027])
-    assert scale.within(0.02698, 0.02702, 0.02698, 0.027, 0.02702) == ["26.980", "27.000", "27.020"]
-    assert Scale.of("N", [1.0]).within(-1.0, 1.0, -0.01) == ["0.0"]
-    assert Scale.of("N", [1.0]).within(1.0, 1.0, 1.0) == ["1.00"]
-    small = Scale.of("kg m^2", [4.768e-6]).within(4.740e-6, 4.795e-6, 4.740e-6, 4.768e-6)
-    assert small == ["4.740e-06", "4.768e-06"]
+@pytest.mark.parametrize("unit", ["N", "kg"])
+def test_a_scale_keeps_the_value(unit: str) -> None:
+    for value in (3.21e-8, 4.9e-4, 5.1e-4, 0.49, 0.51, 23.0):
+        scale = Scale.of(unit, [value, -value / 3.0])
+        assert scale(value) * scale.size == pytest.approx(value)
+        prefixed = {1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}[scale.size]
+        assert scale.unit == prefixed + unit
+        assert unit == "kg" or scale(value) >= 0.5
+        assert unit == "kg" or scale.size == 1.0 or scale(value) < 500.0
+    assert Scale.of(unit, []).size == 1.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "ends", "values", "printed"),
+    [
+        ("m", (0.02698, 0.02702), (0.02698, 0.027, 0.02702), ["26.980", "27.000", "27.020"]),
+        ("N", (-1.0, 1.0), (-0.01, 1.0), ["0.0", "1.0"]),
+        ("N", (1.0, 1.0), (1.0,), ["1.00"]),
+        ("kg m^2", (4.740e-6, 4.795e-6), (4.740e-6, 4.768e-6), ["4.740e-06", "4.768e-06"]),
+    ],
+)
+def test_an_interval_has_two_digits_of_its_half_width(unit, ends, values, printed) -> None:
+    assert Scale.of(unit, [values[-1]]).within(*ends, *values) == printed

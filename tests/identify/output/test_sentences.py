@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import built_results as made
-import numpy as np
 import pytest
-from built_fits import CATALOGUE, axis_of, built, built_fit, fitted
+from built_fits import axis_of, built, built_fit, fitted
 
 from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import Change, MovedParameter, Refit
 from identify.experiment_design.missing_excitation import Gap
-from identify.experiment_design.planting import FORCE, MASS, exemplary_motion, signature
 from identify.output.numbers import quantity, span
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.output.words.fit import (
@@ -23,7 +21,6 @@ from identify.output.words.fit import (
 )
 from identify.output.words.plan import gap_in_words
 from identify.results.addition import Addition
-from twin.effect import Kind
 from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests
 from twin.model.machine import HistoryStep
@@ -112,36 +109,3 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
     told, note = notes(curve, (moved,))
     assert told.startswith("empirical_map is a fitted curve, not a physical law")
     assert note.startswith("mass moved")
-
-
-# --- the fingerprint of an effect ----------------------------------------------------------
-
-
-def test_the_exemplary_motion_is_one_motion_with_the_command_that_it_takes() -> None:
-    m = exemplary_motion()
-    x, v, u = m.signals
-    inner = slice(10, 1480)
-    np.testing.assert_allclose(np.gradient(x, m.period)[inner], v[inner], atol=1e-12)
-    takes = MASS * np.gradient(v, m.period) + 0.3 * np.sign(v)
-    np.testing.assert_allclose(u[inner], takes[inner], atol=1e-9)
-    assert (x.min(), x.max()) == pytest.approx((-0.15, 0.15))
-    tops = [np.abs(v[part]).max() for part in (slice(0, 2900), slice(3100, 8900), slice(9100, -1))]
-    assert tops == pytest.approx([0.15 * np.pi / half for half in (1.5, 3.0, 6.0)], rel=1e-3)
-    np.testing.assert_allclose(m.others[1][10:400], np.gradient(m.others[0], m.period)[10:400])
-    np.testing.assert_allclose(m.others[2][10:400], np.gradient(m.others[1], m.period)[10:400])
-
-
-@pytest.mark.parametrize("name", ["quadratic_drag", "constant_force", "lugre"])
-def test_a_fingerprint_is_the_force_that_an_effect_adds(name) -> None:
-    effect = CATALOGUE[name]
-    motion, force = signature(effect, CATALOGUE)
-    v = motion.signals[1]
-    if effect.kind is Kind.FRICTION:
-        assert np.corrcoef(force, v)[0, 1] < -0.3
-        return
-    assert np.sqrt(np.mean(force**2)) == pytest.approx(FORCE, rel=0.01)
-    shape = -v * np.abs(v) if name == "quadratic_drag" else np.ones_like(v)
-    assert abs(force @ shape) == pytest.approx(
-        np.linalg.norm(force) * np.linalg.norm(shape), rel=1e-6
-    )
-    assert axis_of().names == ("coulomb_viscous",)

@@ -34,8 +34,6 @@ from twin.laws import verdict
 
 FILE = Path(__file__).parent / "texts.txt"
 
-# --- fits ------------------------------------------------------------------------------------
-
 
 def refused_fit():
     """Without an interval for a reason that holds for all parameters, which is said once."""
@@ -51,8 +49,6 @@ def curve_fit():
     fit = built_fit(1.0, axis=made.axis_of(fitted(effect.name)))
     return replace(made.fit_result(), fits={"x": fit}, estimates={"x": (strength,)})
 
-
-# --- diagnoses -------------------------------------------------------------------------------
 
 COGGING, LUGRE = made.FOUND
 ALONE = replace(COGGING, tied=())
@@ -115,8 +111,6 @@ def beyond():
     quiet = {"axes": {"y": result.axes["y"]}, "refits": {"y": Refit(1.0, 1.0, ())}}
     return replace(result, summaries=summaries, **quiet)
 
-
-# --- all of them -----------------------------------------------------------------------------
 
 DRAG, WITH_LUGRE = step(made.RIVAL), step(made.LATER)
 WEAR = replace(made.addition(), step=made.STEPS[2])
