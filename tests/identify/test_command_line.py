@@ -45,7 +45,7 @@ def folder(recorded, tmp_path) -> Path:
     write_log(Log(1000.0, {"z": AxisLog({"position": ramp, "force": ramp})}), tmp_path / "z.mcap")
     current = AxisLog({"position": ramp, "current": ramp})
     write_log(Log(1000.0, {"x": current}), tmp_path / "current.mcap")
-    for value in ("-1.0", "nan", "1e16"):
+    for value in ("-1.0", "nan"):
         (tmp_path / f"bad{value}.toml").write_text(STAGE.replace("Fc = 0.285", f"Fc = {value}"))
     narrow = STAGE.replace("travel = [-0.17, 0.17]", "travel = [0.17, -0.17]")
     (tmp_path / "narrow.toml").write_text(narrow)
@@ -63,9 +63,6 @@ def cli(tmp_path) -> Cli:
     return run
 
 
-# --- failures ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("command", "said"),
     [
@@ -75,16 +72,14 @@ def cli(tmp_path) -> Cli:
         ("add coging proton_xy log.mcap -o b.toml", ["'cogging'"]),
         ("fit proton_yx log.mcap", ["proton_xy.toml"]),
         ("fit no/proton_xy.toml log.mcap", ["proton_xy.toml"]),
-        *((f"fit bad{value}.toml log.mcap", ["Fc", " N"]) for value in ("-1.0", "nan", "1e16")),
+        *((f"fit bad{value}.toml log.mcap", ["Fc", " N"]) for value in ("-1.0", "nan")),
         ("fit proton_xy nowhere.mcap", ["nowhere.mcap"]),
         ("compare proton_xy text.mcap", ["text.mcap"]),
         ("diagnose proton_xy cut.mcap", ["twin recover"]),
         ("fit proton_xy z.mcap", ["axis"]),
         ("fit proton_xy current.mcap", ["force constant (N/A)"]),
         ("simulate tracking --model narrow.toml", ["travel"]),
-        ("reproduce", ["`make thesis` or `python -m studies.thesis`"]),
         ("reproduce --chapter cable --log a b", ["`python -m studies.thesis`"]),
-        ("selftest --help", ["`make selftest` or `python -m benchmarks selftest`"]),
         ("selftest --case cogging@5/cable/17", ["`python -m benchmarks selftest`"]),
     ],
 )
@@ -93,12 +88,9 @@ def test_what_is_wrong_is_one_line_that_says_what_to_try(folder, command, said):
     assert all(part in line for part in said)
 
 
-def test_far_names_are_not_suggested_and_gone_commands_not_listed(folder):
+def test_far_names_are_not_suggested(folder):
     for far in ("m.toml", "cogging"):
         assert "package has" not in refusal("fit", far, "log.mcap", folder=folder)
-    listed = twin("--help", folder=folder).stdout
-    assert "reproduce" not in listed
-    assert "selftest" not in listed
 
 
 @pytest.mark.parametrize(
@@ -135,7 +127,6 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
     ("arguments", "said"),
     [
         (("fit", "m.toml", "a.mcap", "-o", ""), "-o ''"),
-        (("", "a.mcap"), "''"),
         (("check", ""), "check ''"),
     ],
 )
@@ -218,27 +209,25 @@ def test_help_is_where_it_is_looked_for(cli):
     assert (code, err) == (0, "")
     assert out.count("\n") > 10
     assert "diagnose" in out
+    assert "selftest" not in out
 
 
-# --- what is told with success -----------------------------------------------------------------
-
-
-def test_the_documented_keys_of_diagnose_are_there(folder):
-    with in_small("quadratic_drag"):
-        done = twin("diagnose", "proton_xy", "log.mcap", "--json", folder=folder)
-    answer = json.loads(done.stdout)
-    keys = "verdict effect ranking ambiguous_with findings also_seen unexplained remainder"
-    assert {*keys.split(), "noise_floor", "noise_floors", "parameters"} <= set(answer)
-    assert answer["verdict"] == "nothing_missing"
-
-
-def test_a_truncated_log_can_be_recovered(folder):
+def test_a_truncated_log_is_recovered_diagnosed_and_no_effect_added(folder):
     result = twin("recover", "cut.mcap", "-o", "good.mcap", "--json", folder=folder)
     assert result.returncode == 0, result.stderr
     told = json.loads(result.stdout)
     assert told["lost"]
     assert (told["log"], told["others"]) == ("good.mcap", [])
-    assert twin("compare", "proton_xy", "good.mcap", folder=folder).returncode == 0
+    with in_small("quadratic_drag"):
+        done = twin("diagnose", "proton_xy", "good.mcap", "--json", folder=folder)
+    answer = json.loads(done.stdout)
+    keys = "verdict effect ranking ambiguous_with findings also_seen unexplained remainder"
+    assert {*keys.split(), "noise_floor", "noise_floors", "parameters"} <= set(answer)
+    assert answer["verdict"] == "nothing_missing"
+    add = ("add", "quadratic_drag", "proton_xy", "good.mcap", "-o", "b.toml", "--json")
+    result = twin(*add, folder=folder)
+    assert result.returncode == 1
+    assert json.loads(result.stdout)["kept"] is False
 
 
 def test_a_drive_too_weak_for_its_motion_is_told_of(tmp_path):
@@ -251,14 +240,6 @@ def test_a_drive_too_weak_for_its_motion_is_told_of(tmp_path):
     assert "axis x" in line
     assert "outside its travel" in line
     assert twin(*command, folder=tmp_path).stderr == ""
-
-
-def test_adding_what_the_data_do_not_support_is_said_with_exit_code_one(folder):
-    result = twin(
-        "add", "quadratic_drag", "proton_xy", "log.mcap", "-o", "b.toml", "--json", folder=folder
-    )
-    assert result.returncode == 1
-    assert json.loads(result.stdout)["kept"] is False
 
 
 def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):

@@ -64,12 +64,7 @@ def test_planted_friction_is_found(folder):
             lambda p, f: (p * [1, 1, -1], f * [1, 1, -1]),
             "axis elbow: with the other sign of its position and torque",
         ),
-        (
-            lambda p, f: (p * [1, -1, 1], f),
-            "axis shoulder: with the other sign of its position (sign",
-        ),
         (lambda p, f: (p[:, [0, 2, 1]], f[:, [0, 2, 1]]), "axes shoulder and elbow: exchanged"),
-        (lambda p, f: (np.degrees(p), f), "axes base, shoulder, elbow: with positions in deg"),
         (lambda p, f: (p * [1, np.degrees(1), 1], f), "axis shoulder: with positions in deg"),
         (lambda p, f: (np.radians(p), f), "axes base, shoulder, elbow: with positions in rad"),
     ],
@@ -198,12 +193,7 @@ def test_a_model_file_that_is_wrong_is_one_line(folder, old, new, said):
     assert said in refusal("fit", "wrong.toml", "1.mcap", "-o", "fitted.toml", folder=folder)
 
 
-def test_what_is_not_done_for_joints_is_one_line(folder):
-    said = refusal("plan", "arm.toml", "1.mcap", "-o", "next.toml", folder=folder)
-    assert "joints of arm.xml, for which no experiment is planned" in said
-
-
-def test_a_log_that_lacks_a_joint_is_one_line(folder):
+def test_a_log_that_lacks_a_joint_and_a_plan_for_joints_are_one_line(folder):
     log = arm_log(1)
     del log.axes["elbow"]
     write_log(log, folder / "less.mcap")
@@ -211,9 +201,8 @@ def test_a_log_that_lacks_a_joint_is_one_line(folder):
     assert "has no axis 'elbow', which is a joint of arm.xml" in said
     said = refusal("new", "less.mcap", "--mjcf", "arm.xml", "-o", "other.toml", folder=folder)
     assert "the joints elbow are no axes" in said
-
-
-# --- bodies and motors that are not as the file says ------------------------------------------
+    said = refusal("plan", "arm.toml", "1.mcap", "-o", "next.toml", folder=folder)
+    assert "joints of arm.xml, for which no experiment is planned" in said
 
 
 def loaded(model: mujoco.MjModel) -> None:
@@ -232,8 +221,8 @@ def loaded(model: mujoco.MjModel) -> None:
     model.body_sameframe[fore] = 0
 
 
-def heavier(model: mujoco.MjModel) -> None:
-    """An upper arm of 15 % more mass."""
+def heavier_upper_arm(model: mujoco.MjModel) -> None:
+    """By 15 % of its mass."""
     model.body_mass[model.body("upper").id] *= 1.15
 
 
@@ -268,9 +257,8 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     old = '<inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>'
     assert (tmp_path / "corrected.xml").read_text() == ARM.replace(old, element)
     assert (tmp_path / "arm.xml").read_text() == ARM
-    again = diagnose(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
-    assert again.body is None
-    assert not any(d.findings for d in again.axes.values())
+    again = fit(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]})
+    assert max(again.fits[joint].ratio for joint in JOINTS) < 1.5
     said = refusal("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
     assert "the logs prove no body to correct it" in said
 
@@ -278,7 +266,7 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
 @pytest.mark.parametrize(
     ("change", "gain", "body", "motor"),
     [
-        pytest.param(heavier, 1.0, "upper", None, marks=pytest.mark.slow),
+        pytest.param(heavier_upper_arm, 1.0, "upper", None, marks=pytest.mark.slow),
         (lambda _: None, 1.2, None, "shoulder"),
         pytest.param(lambda _: None, 1.0, None, None, marks=pytest.mark.slow),
     ],

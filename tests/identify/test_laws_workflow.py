@@ -11,10 +11,7 @@ from report_cases import Case, cogging_case
 
 from identify import workflow
 from identify.dataset.dataset import Role
-from identify.output.text import diagnose_text
 from identify.selection.diagnosis import Verdict
-
-# --- the axis of the answer -----------------------------------------------------------------
 
 
 def axis_with(verdict: Verdict, bic: float = 1.0, ratio: float = 2.0):
@@ -28,12 +25,8 @@ def leading(**axes) -> str:
 
 
 def test_the_answer_is_about_the_axis_with_the_strongest_verdict():
-    order = [
-        Verdict.NOTHING_MISSING,
-        Verdict.UNEXPLAINED,
-        Verdict.WRONG_SHAPE,
-        Verdict.MISSING_EFFECTS,
-    ]
+    names = ("NOTHING_MISSING", "UNEXPLAINED", "WRONG_SHAPE", "MISSING_EFFECTS")
+    order = [Verdict[name] for name in names]
     for i, weak in enumerate(order):
         for strong in order[i + 1 :]:
             axes = {"a": axis_with(weak, bic=900.0, ratio=9.0), "b": axis_with(strong)}
@@ -48,9 +41,6 @@ def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
     b = axis_with(verdict, bic=80.0, ratio=3.0)
     assert leading(a=a, b=b) == ("a" if named else "b")
     assert leading(a=a, b=replace(b, ranking=())) == ("a" if named else "b")
-
-
-# --- what a diagnosis and an addition hand on ------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +72,3 @@ def test_what_a_diagnosis_names_is_added_as_it_was_fitted(case):
     assert workflow.add_named(case.diagnosis.__class__(
         case.diagnosis.model, {"x": case.quiet}, case.diagnosis.comparison, {}
     )) is None  # fmt: skip
-
-
-def test_a_result_prints_the_text_of_its_command(case):
-    assert str(case.diagnosis) == diagnose_text(case.diagnosis)
-    assert str(case.addition).startswith("added cogging to axis x\n")
-    assert str(case.diagnosis.comparison).startswith("axis x, run 1: force error")

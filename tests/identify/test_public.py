@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -37,18 +35,13 @@ def test_a_package_offers_ten_to_forty_names_and_lists_them(package) -> None:
         _ = package.nothing
 
 
-def test_to_import_the_packages_loads_neither_numpy_nor_more() -> None:
-    script = (
-        "import sys, twin, identify; print([m for m in sys.modules if m in ('numpy', 'typer')])"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, file) -> None:
+    assert list(identify.first_model(log).axes) == list(log.axes)
     given = [log, file, str(file), [log], (file,), {"a": log}, {"a": file}]
-    found = [identify.fit("proton_xy", one) for one in given[:2]]
+    other = twin.simulate(twin.load_model("proton_xy"), "tracking", seed=2, duration=2.0)
+    found = [identify.fit("proton_xy", one, other) for one in given[:2]]
     assert found[0].model.axes["x"].mass == pytest.approx(found[1].model.axes["x"].mass, rel=1e-6)
+    assert found[0].datasets["x"].holdout
     names = [list(logs_by_name(one, "training")) for one in given]
     alone, there = "training 1", str(file)
     assert names == [[alone], [there], [there], [alone], [there], ["a"], ["a"]]
@@ -56,18 +49,6 @@ def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, fil
         len(logs_by_name(one, "training")[n]) == len(log)
         for one, (n,) in zip(given, names, strict=True)
     )
-
-
-def test_a_first_model_is_that_of_the_logs(log) -> None:
-    model = identify.first_model(log)
-    assert list(model.axes) == list(log.axes)
-    assert identify.fit(model, log).model.axes["x"].mass > 0.0
-
-
-def test_logs_of_two_roles_need_no_names(log) -> None:
-    other = twin.simulate(twin.load_model("proton_xy"), "tracking", seed=2, duration=2.0)
-    found = identify.fit(twin.load_model("proton_xy"), log, other)
-    assert found.datasets["x"].holdout
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def disagreements(after: AxisModel) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("factor", "told"), [(2.5, True), (0.4, True), (1.9, False), (0.55, False), (1.0, False)]
+    ("factor", "told"), [(2.5, True), (0.4, True), (1.9, False), (0.55, False)]
 )
 def test_a_parameter_that_two_objectives_give_far_apart_is_an_alarm(factor, told):
     after = replace(STAGE.axes["x"], mass=factor * STAGE.axes["x"].mass)

@@ -107,25 +107,21 @@ def test_logs_are_prepared_alike_in_each_role():
 
 
 @pytest.mark.parametrize(
-    ("logs", "held", "why"),
+    ("logs", "held", "test", "why"),
     [
-        ({"a": TEST["c"]}, HELD, "a test log, but has samples of a, which is fitted"),
-        (LOGS, {"b": TEST["c"]}, "a test log, but has samples of b, which chooses"),
+        ({"a": TEST["c"]}, HELD, TEST, "c: a test log, but has samples of a, which is fitted"),
+        (LOGS, {"b": TEST["c"]}, TEST, "c: a test log, but has samples of b, which chooses"),
+        # Not even of another recording: what is told of a log, such as its beginning, is by name.
+        (LOGS, {"a": HELD["b"]}, {}, "a: the name of a training log and of a selection log; give"),
+        (LOGS, {}, {"a": TEST["c"]}, "a: the name of a training log and of a test log; give each"),
     ],
 )
-def test_a_log_has_one_role(logs, held, why):
-    with pytest.raises(InputError, match=f"c: {why}") as told:
-        datasets(STAGE, logs, held, test=TEST)
+def test_a_log_and_a_name_have_one_role(logs, held, test, why):
+    with pytest.raises(InputError, match=f"^{why}") as told:
+        datasets(STAGE, logs, held, test=test)
     assert "\n" not in str(told.value)
 
 
-@pytest.mark.parametrize(("held", "test"), [({"a": HELD["b"]}, {}), ({}, {"a": TEST["c"]})])
-def test_a_name_has_one_role(held, test):
-    """Not even of another recording: what is told of a log, such as its beginning, is by name."""
-    role = "selection" if held else "test"
-    why = f"^a: the name of a training log and of a {role} log; give each log one role"
-    with pytest.raises(InputError, match=why) as told:
-        datasets(STAGE, LOGS, held, test=test)
-    assert "\n" not in str(told.value)
+def test_names_of_two_folders_are_two():
     apart = datasets(STAGE, {"one/a.mcap": LOGS["a"]}, {"two/a.mcap": HELD["b"]})["x"]
     assert [log.motion.name for log in apart.logs] == ["one/a.mcap", "two/a.mcap"]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from machines import one_axis
 
-from benchmarks.second_simulator.kernel import READING
-from benchmarks.second_simulator.machine import PLACE, drawn, run
+from benchmarks.second_simulator.machine import drawn, run
 from identify import workflow
 from identify.dataset.noise_floor import noise_beside
 from identify.dataset.spectrum import fitted_levels
@@ -28,13 +27,12 @@ DRIVES = {
 QUICK = ("white", "rounded", "every 5th, rounded", "every 10th")
 
 
-def log_of(name, seed=2, duration=8.0, ripple=0.0):
+def log_of(name, seed=2, duration=8.0):
     rate, resolution, encoder, current = DRIVES[name]
     machine = drawn(
         np.random.default_rng(seed), 10e3, rate,
         resolution=resolution, encoder_noise=encoder, current_noise=current,
     )  # fmt: skip
-    machine = machine.plus(READING, ripple * np.sin(2.0 * np.pi * PLACE / 2e-5))
     return run(machine, seed, duration)
 
 

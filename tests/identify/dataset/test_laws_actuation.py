@@ -87,14 +87,13 @@ def test_a_late_reading_is_undone():
     np.testing.assert_array_equal(true.command, SHORT.command)
 
 
-@pytest.mark.parametrize("samples", [60.0, 12.0])  # in a period at the highest speed
-def test_a_ripple_of_the_encoder_is_undone(samples):
+def test_a_ripple_of_the_encoder_is_undone():
     """reading = x + e(x) of a known x gives e(x) back, also where smoothing takes a ripple off."""
     rate = 2000.0
     x = waves((3e-3, 1.3, 0.4), (6e-4, 5.1, 1.0))
     t = np.arange(3000) / rate
     fastest = np.abs(np.diff(x(t))).max()
-    period = float(samples * fastest)
+    period = float(12.0 * fastest)  # 12 samples at the highest speed
     sizes = {n: period * v / 15 for n, v in {"a1": 0.4, "b1": -0.3, "a2": 0.2, "b2": 0.1}.items()}
     ripple = effect("encoder_ripple", {"period": period, **sizes})
     turn = 2.0 * np.pi * x(t) / period

@@ -57,17 +57,9 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     assert 0.2 < part < 0.6
     (told,) = [text for text in prepared_in_words(beyond) if "selection log" in text]
     assert told.startswith(f"held 0: {100 * part:.0f} % of this selection log is left out: it lies")
-
-
-def test_a_test_log_is_not_called_held_out() -> None:
-    beyond = dataset_of(0.02)
     tested = replace(beyond, holdout=(), test=beyond.holdout)
     (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
     assert "of this test log is left out" in told
-
-
-def test_a_channel_delay_keeps_it() -> None:
-    beyond = dataset_of(0.02)
     assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
 
 

@@ -50,8 +50,10 @@ def rms(values):
     return float(np.sqrt(np.mean(values**2)))
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("reading", [0.0, 0.03, 0.5], ids="{:g} steps of noise".format)
+@pytest.mark.parametrize(
+    ("motion", "reading"),  # the latter in steps
+    [*((m, 0.0) for m in MOTIONS), *((m, 0.5) for m in ("slow", "a step a sample", "fast"))],
+)
 def test_the_floor_with_the_step_is_what_rounding_and_noise_leave(motion, reading):
     log = rounded(*MOTIONS[motion], reading=reading * MOTIONS[motion][0])
     assert floor_of(KNOWING, [log]) == pytest.approx(rms(residual(PLAIN, [log])), rel=0.2)

@@ -29,7 +29,7 @@ def measured(seed: int, late: float = 0.0, gain: float = 1.0):
     return x, gain * speed(T - late) + rng.normal(0.0, TOLD, len(T))
 
 
-@pytest.mark.parametrize("late", [0.0, 2e-3, 4.3e-3])
+@pytest.mark.parametrize("late", [0.0, 4.3e-3])
 def test_the_position_that_both_tell_is_nearer_to_the_truth(late):
     x, v = measured(1, late)
     position, weight = together(x, v, RATE**-1)

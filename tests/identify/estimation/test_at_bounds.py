@@ -35,7 +35,7 @@ def test_a_parameter_that_the_data_push_beyond_its_bound_is_named():
 
 
 def test_a_strength_that_is_truly_zero_is_not_at_its_bound():
-    for seed in range(6):
+    for seed in range(3):
         found = fitted_viscous(0.0, seed)
         assert found.ended is Outcome.CONVERGED
         assert found.at_bound == ()

@@ -27,7 +27,10 @@ AXIS = STAGE.axes["x"]
 
 @pytest.fixture(scope="module")
 def dataset():
-    logs = {f"log {s}": simulate(STAGE, "tracking", seed=s, duration=15.0) for s in (1, 2)}
+    logs = {
+        f"log {s}": simulate(STAGE, "tracking", seed=s, duration=15.0, simulator=ReducedSimulator)
+        for s in (1, 2)
+    }
     return datasets(STAGE, logs, {})["x"]
 
 
@@ -36,12 +39,11 @@ def fitted(dataset):
     return fit_axis(AXIS, dataset.fit)
 
 
-@pytest.mark.parametrize("factor", [0.5, 1.5])
-def test_every_parameter_is_found_from_a_start_half_off(dataset, factor):
+def test_every_parameter_is_found_from_a_start_half_off(dataset):
     where = free_parameters(AXIS)
     truth = read(AXIS, where)
     off = [c.parameter.name != "phase" for c in where]
-    found = fit_axis(write(AXIS, where, np.where(off, factor * truth, truth)), dataset.fit)
+    found = fit_axis(write(AXIS, where, np.where(off, 0.5 * truth, truth)), dataset.fit)
     assert found.ratio < 1.2
     for c, value, true in zip(where, read(found.axis, where), truth, strict=True):
         loose = 0.15 if c.label in ("lugre.sigma1", "lugre.sigma2") else 0.05
@@ -74,7 +76,7 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     stops = {"low": lowest, "high": highest, "stiffness": 2.0}
     effect = CATALOGUE["end_stop"]
     there = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(effect, stops)))
-    log = simulate(there, "tracking", seed=3, duration=10.0)
+    log = simulate(there, "tracking", seed=3, duration=10.0, simulator=ReducedSimulator)
     dataset = datasets(STAGE, {"log": log}, {})["x"]
     touching = float(dataset.fit[0].motion.position.min()) + 1e-4
     begun = AXIS.with_effect(Fitted.at_start(effect, {**stops, "low": touching}))

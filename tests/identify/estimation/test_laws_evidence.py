@@ -20,9 +20,6 @@ from identify.estimation.least_squares import RIDGE
 RNG = np.random.default_rng(21)
 
 
-# --- evidence -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("pole", [0.0, 0.6, 0.95, -0.5])
 def test_effective_samples_are_those_of_geyers_pairs(pole):
     r = coloured(1801, pole, 3) + 5.0
@@ -81,12 +78,6 @@ def test_a_held_out_gain_is_a_t_test_over_blocks():
     assert np.isnan([none.before, none.after]).all()
 
 
-def test_a_noise_gain_is_that_of_the_normal_likelihood():
-    r = RNG.normal(size=200)
-    both = [norm(0.0, s).logpdf(r).mean() for s in (0.7, 1.2)]
-    assert noise_gain(r, 0.7, 1.2) == pytest.approx(2.0 * (both[1] - both[0]))
-
-
 @pytest.mark.parametrize("smoothed", [False, True])
 def test_a_left_out_residual_is_that_of_a_fit_that_has_not_seen_it(smoothed):
     columns, data, _ = linear(1)
@@ -100,9 +91,12 @@ def test_a_left_out_residual_is_that_of_a_fit_that_has_not_seen_it(smoothed):
         np.testing.assert_allclose(found[block], (columns @ again - data)[block], atol=1e-6)
 
 
-@pytest.mark.parametrize("freedom", [8, 9, 23, 100])
-def test_the_quantile_of_students_t_is_scipys(freedom):
+@pytest.mark.parametrize("freedom", [8, 100])
+def test_a_quantile_and_a_noise_gain_are_scipys(freedom):
     for chance in (0.05, 0.01):
         assert students_t(chance, freedom) == pytest.approx(
             stdtrit(freedom, 1.0 - chance), rel=1e-3
         )
+    r = RNG.normal(size=200)
+    both = [norm(0.0, s).logpdf(r).mean() for s in (0.7, 1.2)]
+    assert noise_gain(r, 0.7, 1.2) == pytest.approx(2.0 * (both[1] - both[0]))

@@ -28,7 +28,6 @@ ODD = AxisModel(
     ),
 )
 
-# --- priors -------------------------------------------------------------------------------------
 
 LOGS = [windowed(moved(np.random.default_rng(k), 1.5, 1000.0)) for k in (1, 2)]
 
@@ -52,17 +51,6 @@ def one_way(speed: float, seed: int):
     signals[0] = speed * np.arange(signals.shape[1]) * motion.period
     signals[1] = speed
     return windowed(replace(motion, signals=signals, raw=signals[1:]))
-
-
-def test_a_strength_that_the_motion_hardly_reaches_stays_where_it_starts():
-    """Bumps of a roller that is passed one way alone: those of the other way tell nothing."""
-    bumps = effect("roller_spikes", {"ahead": 0.05, "behind": 0.04, "width": 3e-3})
-    logs = [one_way(0.1, seed=5)]
-    axis = AxisModel(1.7, effects=(*ODD.effects[:1], bumps))
-    assert fit_axis(axis, logs).axis["roller_spikes"].values["behind"] == pytest.approx(0.04)
-
-
-# --- fits ---------------------------------------------------------------------------------------
 
 
 def made_for(axis: AxisModel):

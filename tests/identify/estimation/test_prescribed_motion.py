@@ -24,9 +24,9 @@ def test_forces_are_those_of_the_law_at_that_place_and_speed() -> None:
     np.testing.assert_allclose(back, rubbing, rtol=1e-9)
 
 
-@pytest.mark.parametrize("period", [1e-3, 4e-3])
-def test_a_state_goes_on_by_the_speed_and_the_length_of_a_sample(period: float) -> None:
+def test_a_state_goes_on_by_the_speed_and_the_length_of_a_sample() -> None:
     """Dahl's force after a way s is Fc (1 - exp(-sigma s / Fc)), whatever the samples."""
+    period = 4e-3
     dahl = fitted("dahl", Fc=0.4, sigma0=250.0)
     way = 1e-2
     count = round(way / (0.005 * period))
@@ -37,8 +37,7 @@ def test_a_state_goes_on_by_the_speed_and_the_length_of_a_sample(period: float) 
     np.testing.assert_allclose(force, 0.4 * (1.0 - np.exp(-250.0 * middle / 0.4)), atol=2e-3)
 
 
-@pytest.mark.parametrize("way", [1.0, -1.0])
-@pytest.mark.parametrize("place", [-0.1, 0.05])
+@pytest.mark.parametrize(("way", "place"), [(1.0, -0.1), (-1.0, 0.05)])
 def test_steady_friction_is_what_the_laws_reach_at_one_place(way: float, place: float) -> None:
     """Stribeck's curve with the level of the place, more forwards than backwards."""
     lugre = fitted("lugre", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018, sigma0=260.0, sigma1=0.6)

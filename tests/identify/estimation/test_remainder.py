@@ -61,13 +61,19 @@ def chirp(log, rng):
     return np.sqrt(2.0) * SIZE * np.sin(2.0 * np.pi * (5.0 + 10.0 * time / time[-1]) * time)
 
 
+def bursts(log, rng):
+    """A force that acts now and then, for some test functions."""
+    return 6.0 * SIZE * rng.standard_normal(len(log)) * (np.arange(len(log)) % 97 < 4)
+
+
 def fit_to(data):
     return finished(PLAIN, PLAIN, data.fit, Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("held", [("held",), ()], ids=["held out", "left out"])
 @pytest.mark.parametrize(
-    ("force", "is_noise"), [(noise, True), (of_place, False), (of_speed, False), (chirp, False)]
+    ("force", "is_noise"),
+    [(noise, True), (of_place, False), (of_speed, False), (chirp, False), (bursts, False)],
 )
 def test_only_what_nothing_foretells_is_noise(force, is_noise, held):
     data = left(force, held)
@@ -90,26 +96,12 @@ def test_noise_is_part_of_the_floor_and_said():
     assert all(log.force_noise == known.force_noise for log in known.logs)
 
 
-def test_what_is_larger_on_the_held_out_logs_is_no_noise():
-    data = left(noise)
-    more = tuple(replace(log, command=2.0 * log.command) for log in data.holdout)
-    assert not noise_is_left(fit_to(data), replace(data, holdout=more))
-
-
-def test_one_log_alone_does_not_show_that_what_is_left_is_noise():
+def test_one_log_or_one_that_is_larger_where_held_out_does_not_show_noise():
     data = left(noise)
     alone = replace(data, fit=data.fit[:1], holdout=())
     assert not noise_is_left(fit_to(alone), alone)
-
-
-def bursts(log, rng):
-    """A force that acts now and then, for some test functions."""
-    return 6.0 * SIZE * rng.standard_normal(len(log)) * (np.arange(len(log)) % 97 < 4)
-
-
-def test_what_comes_in_bursts_is_no_noise():
-    data = left(bursts)
-    assert not noise_is_left(fit_to(data), data)
+    more = tuple(replace(log, command=2.0 * log.command) for log in data.holdout)
+    assert not noise_is_left(fit_to(data), replace(data, holdout=more))
 
 
 def test_no_noise_of_many_is_refused_often():

@@ -44,8 +44,6 @@ AXIS = AxisModel(
     ),
 )
 
-# --- planting -----------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize(
     "name", ["cogging", "cable_slab", "quadratic_drag", "encoder_delay", "encoder_quantization"]
@@ -127,8 +125,6 @@ def test_another_machine_has_each_value_within_a_fifth_and_the_same_mass():
     assert max(taus) == 6e-3
 
 
-# --- the free run -------------------------------------------------------------------------------
-
 RATE = 2000.0
 T = np.arange(round(1.7 * RATE)) / RATE
 
@@ -167,19 +163,6 @@ def test_states_at_a_restart_are_those_of_the_motion_before_it():
     wanted = np.where(since > 0.0, 3.0 * (1.0 - np.exp(-since / 0.03)), 0.0)
     np.testing.assert_allclose(own[0], wanted, atol=1e-9)
     np.testing.assert_allclose(own[1], -5.0)
-
-
-def test_a_coupled_axis_follows_the_others_motion_before_a_restart():
-    """A cable dragged by one axis alone is bent on it, and on no other."""
-    x = np.stack([0.1 * np.sin(9.0 * T), 0.03 + 0.0 * T], axis=1)
-    axis = AxisModel(1.0, effects=(effect("cable_hysteresis", {"f0": 0.4}),))
-    starts = np.array([900, 1900])
-    table, states = states_of(axis, x, starts)
-    first, second = (slice(int(e[3]), int(e[3]) + 4) for e in table.entries)
-    assert np.abs(states[:, first]).max() > 1e-4
-    assert not states[:, second].any()
-    _, swapped = states_of(axis, x[:, ::-1], starts)
-    np.testing.assert_array_equal(swapped[:, second], states[:, first])
 
 
 def test_friction_before_a_restart_knows_the_place_and_the_other_axis():

@@ -54,19 +54,13 @@ def with_limits(**changed: float | tuple[float, float] | None) -> MachineModel:
 WEAK = with_limits(force_limit=2.0, jerk=5.0)
 STAGES = {
     "proton": PROTON,
-    "one axis": one_axis(PROTON),
     "short and slow": with_limits(travel=(0.01, 0.04), velocity=0.02, acceleration=0.1),
     "weak": WEAK,
     "emps": load_model("examples/emps.toml", CATALOGUE),
 }
 
 
-# --- what is proposed -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "value", [0.1234567, 0.999999, 1.0, 4.0, 1234.9, 5e-7, 0.29999999999999999]
-)
+@pytest.mark.parametrize("value", [0.1234567, 0.999999, 1234.9, 0.29999999999999999])
 def test_a_neat_value_has_three_digits_and_is_no_larger(value):
     found = neat(value)
     assert value * (1.0 - 1e-2) < found <= value * (1.0 + 1e-12)
@@ -106,21 +100,15 @@ def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     assert stairs.speeds[0] == pytest.approx(5e-4 * scale, rel=0.01)
 
 
-def test_a_velocity_map_of_a_slow_axis_is_as_fast_as_it_can_be():
+def test_a_slow_axis_is_mapped_as_fast_as_it_can_and_a_weak_motor_moves_gently():
     slow = AxisModel(5e-6, replace(TURNED, velocity=1e-3), rotary=True)
     found, not_run = proposals(MachineModel("r", {"a": slow}, 20.0), "a", 20.0)
     every = [*found, *(n.experiment for n in not_run)]
     (stairs,) = (e for e in every if isinstance(e, Staircase))
     assert (stairs.speeds[0], stairs.speeds[-1]) == (1e-4, 1e-3)
-
-
-def test_a_weak_motor_makes_all_moves_gentler():
     weak = replace(STAGE, axes={"x": replace(PLAIN, hardware=replace(HARDWARE, force_limit=5.3))})
     efforts = {getattr(e, "effort", 0.2) for e in proposals(weak, "x", 8.0)[0]}
     assert efforts == {0.2, 0.1}  # a fifth of what the limits allow, and half of it under a sweep
-
-
-# --- limits -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", STAGES)
@@ -204,7 +192,6 @@ def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_ove
     [
         (with_limits(travel=None), Tracking(2.0)),
         (with_limits(velocity=1e-4), Tracking(2.0)),
-        (PROTON, Passes("x", span=0.1, speed=9.0, repeats=1)),
         (PROTON, Passes("x", span=0.001, speed=0.2, repeats=1)),
         (one_axis(PROTON), Passes("x", span=0.1, speed=0.1, repeats=1, other=0.3)),
         (PROTON, Sweep("x", 0.1, 0.01, 1, 1e4, 2.0, 60.0, effort=0.5)),

@@ -12,8 +12,8 @@ from identify.validation.whiteness import Loop, correlation, loop_of, residual_t
 from identify.workflow import fit
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
-from twin.logs import Log
 from twin.model.file import load_model
+from twin.simulator import ReducedSimulator
 
 CATALOGUE = load_catalogue()
 STAGE = one_axis(load_model("proton_xy", CATALOGUE))
@@ -38,24 +38,6 @@ def test_of_a_white_residual_a_tenth_leaves_the_bounds_and_nearly_all_pass():
         assert tests[0].bound == pytest.approx(1.645 / np.sqrt(N), rel=1e-3)
 
 
-@pytest.mark.parametrize("pole", [0.3, 0.9])
-def test_a_coloured_residual_leaves_the_bounds(pole):
-    coloured = lfilter([1.0], [1.0, -pole], drawn(1)[0])
-    test = correlation("residual", [coloured], [coloured], SPACING, Loop.OPEN)
-    assert not test.passes
-    assert test.value[0] == pytest.approx(pole, abs=0.08)
-    assert test.lag[0] == SPACING
-
-
-def test_a_residual_that_knows_the_command_shows_at_its_lag():
-    white, command = drawn(2)
-    left = white + 0.4 * np.roll(lfilter([1.0, -0.95], [1.0], command), 3)
-    pure = lfilter([1.0, -0.95], [1.0], command)
-    test = correlation("command", [left], [pure], SPACING, Loop.CLOSED)
-    assert not test.passes
-    assert test.lag[np.argmax(np.abs(test.value))] == pytest.approx(3 * SPACING)
-
-
 def test_what_feedback_does_to_the_command_is_no_fault_of_the_model():
     """A command that answers the residual comes after it: not tested where the loop is closed."""
     white, _ = drawn(3)
@@ -78,31 +60,23 @@ def test_gaps_and_the_seams_between_logs_do_not_count():
     assert test.bound == pytest.approx(1.645 / np.sqrt(N - 500 + 300), rel=1e-3)
 
 
-@pytest.fixture(scope="module")
-def logs() -> dict[str, Log]:
-    return {"run": simulate(STAGE, "tracking", seed=3, duration=20.0)}
+def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
+    logs = {"run": simulate(STAGE, "tracking", seed=3, duration=12.0, simulator=ReducedSimulator)}
 
+    def tested(stage):
+        result = fit(stage, logs)
+        found, dataset = result.fits["x"], result.datasets["x"]
+        force = residual(found.axis, dataset.fit)
+        return residual_tests(dataset.fit, force, found.kept, found.floor, loop_of(dataset.fit))
 
-def fitted_and_tested(stage, logs):
-    result = fit(stage, logs)
-    found, dataset = result.fits["x"], result.datasets["x"]
-    force = residual(found.axis, dataset.fit)
-    return residual_tests(dataset.fit, force, found.kept, found.floor, loop_of(dataset.fit))
-
-
-def test_the_twins_own_log_passes_and_fits_the_normal_of_the_floor(logs):
-    found = fitted_and_tested(STAGE, logs)
+    found = tested(STAGE)
     assert found.passes
     assert found.loop is Loop.CLOSED
     assert found.within == pytest.approx(0.9, abs=0.06)
     assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_model_that_lacks_an_effect_fails(logs):
-    poor = STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab"))
-    found = fitted_and_tested(poor, logs)
-    assert not any(c.passes for c in found.correlations)
-    assert found.within < 0.3
+    poor = tested(STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab")))
+    assert not any(c.passes for c in poor.correlations)
+    assert poor.within < 0.3
 
 
 def test_correlations_are_the_plain_sums_at_their_lags():

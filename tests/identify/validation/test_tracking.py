@@ -25,15 +25,17 @@ HARDWARE = Hardware(
     travel=(-0.1, 0.1), encoder_noise=1e-9, velocity=0.2, acceleration=2.0, jerk=100.0
 )
 KNOWN = MachineModel("slide", {"x": replace(SLIDE, hardware=HARDWARE)}, 2000.0)
-HIDDEN = (
-    "cogging", "cable_hysteresis", "quadratic_drag", "asymmetric_friction", "payload_mass",
-    "force_constant_ripple",
-)  # fmt: skip
+
+
+HIDDEN = {
+    "cogging": None, "cable_hysteresis": None, "payload_mass": None, "asymmetric_friction": None,
+    "force_constant_ripple": None, "actuator_delay": {"tau": 2e-3}, "actuator_lag": {"tau": 2e-3},
+}  # fmt: skip
 
 
 def having(effect: str) -> MachineModel:
     own = CATALOGUE[effect]
-    values = moderate(own, np.random.default_rng(4), 0.5)
+    values = HIDDEN[effect] or moderate(own, np.random.default_rng(4), 0.5)
     return KNOWN.with_axis("x", KNOWN.axes["x"].with_effect(Fitted.at_start(own, values)))
 
 
@@ -74,14 +76,6 @@ def test_a_friction_takes_the_place_of_the_one_before(log) -> None:
     found = feedforward(model, log, KNOWN).axes["x"]
     assert found.before is not None
     assert found.gains == {"lugre": pytest.approx(found.before.rms - found.diagnosed.rms)}
-
-
-@pytest.mark.parametrize("effect", ["actuator_delay", "actuator_lag"])
-def test_a_late_drive_is_led_by_the_feedforward(log, effect) -> None:
-    axis = KNOWN.axes["x"].with_effect(Fitted.at_start(CATALOGUE[effect], {"tau": 2e-3}))
-    found = feedforward(KNOWN.with_axis("x", axis), log, KNOWN).axes["x"]
-    assert found.before is not None
-    assert found.diagnosed.rms < found.before.rms / 3.0
 
 
 def test_the_machine_may_be_another_than_the_model(log) -> None:
