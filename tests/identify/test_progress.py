@@ -26,7 +26,8 @@ from twin.model.file import load_model
 model = load_model("proton_xy", load_catalogue())
 logs = {"log": simulate(model, "tracking", seed=1, duration=4.0)}
 known = load_catalogue()
-few = Catalogue([known[name] for name in ("wear", "spring", "cogging")])
+few = Catalogue([known[name] for name in ("wear", "spring", "cable_slab")])
+model = model.with_axis("x", model.axes["x"].without("cable_slab"))
 with progress_on_stderr(first=0.1, every=0.05) as progress:
     found = workflow.diagnose(model, logs, catalogue=few, progress=progress)
 print(json.dumps(list(found.axes)))

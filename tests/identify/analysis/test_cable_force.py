@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import identify
-from identify.analysis.cable_force import CableForce, Passes, Spike, find_spikes, pitch_of, smoother
+from identify.analysis.cable_force import CableForce, Passes, Spike, find_spikes, pitch_of
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments import kinds
@@ -49,11 +49,6 @@ def test_a_track_without_spikes_has_none_and_one_not_found_leaves_the_pitch_as_i
     found = pitch_of(tuple(Spike(p, 0.004, 0.05, 0.05) for p in places))
     assert found is not None
     assert found.value == pytest.approx(0.03)
-
-
-def test_the_smoother_keeps_parabolas_even_where_something_is_left_out() -> None:
-    kept = np.abs(PLACE) > 0.003
-    assert smoother(PLACE, kept) @ np.where(kept, CABLE, 9.9) == pytest.approx(CABLE, abs=1e-9)
 
 
 def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth() -> None:

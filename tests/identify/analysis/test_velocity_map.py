@@ -1,26 +1,38 @@
-"""Maps of logs: each direction's curve, places of the track, the axis that is meant."""
+"""Friction from logs: maps over velocity, the curve through them, the stiffness of bristles."""
 
 from __future__ import annotations
 
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from built_fits import axis_of, fitted
+from scipy.special import stdtrit
 
 import identify
-from identify.analysis.friction_curve import StribeckCurve
+from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free
+from identify.analysis.friction_curve import (
+    LINE,
+    NAMES,
+    StribeckCurve,
+    curve_through,
+    fit_stribeck,
+    stribeck_through,
+)
 from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.experiments.kinds import Reversals, Staircase
+from twin.experiments.kinds import OpenLoopSine, Reversals, Staircase
 from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
-from twin.simulator import ReducedSimulator
+from twin.model.parameters import free_parameters
+from twin.simulator import FineSimulator, ReducedSimulator
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 CATALOGUE = load_catalogue()
@@ -66,13 +78,16 @@ def test_a_map_has_a_curve_each_way_and_the_mean_of_both(logs) -> None:
     assert found.units.velocity == "m/s"
 
 
-def test_the_axis_must_be_one_that_moves(logs) -> None:
+def test_the_axis_must_be_one_that_moves_and_at_constant_speed(logs) -> None:
     with pytest.raises(InputError, match="axis z does not move in the logs; there moves x"):
         identify.friction_map(ONE, logs, axis="z")
     both = simulate(STAGE, "tracking", seed=1, duration=2.0, simulator=ReducedSimulator)
     assert len(datasets(STAGE, {"run": both}, {})) == 2
     with pytest.raises(InputError, match="x, y move in the logs; give the axis"):
         identify.velocity_map(STAGE, {"run": both})
+    log = simulate(SLIDE, Reversals("x", repeats=8), simulator=ReducedSimulator)
+    with pytest.raises(InputError, match="no constant speed"):
+        VelocityMap.of(SLIDE.axes["x"], motion_of(log, "x", "log"))
 
 
 def test_the_map_of_a_real_drive_shows_its_direction_dependent_viscosity(shared_data) -> None:
@@ -101,7 +116,84 @@ def test_friction_of_a_machine_with_a_cable_lies_on_its_curve() -> None:
     assert np.all(np.diff(np.abs(found.towards(-1.0).velocity)) > 0.0)
 
 
-def test_a_log_without_constant_speed_is_refused() -> None:
-    log = simulate(SLIDE, Reversals("x", repeats=8), simulator=ReducedSimulator)
-    with pytest.raises(InputError, match="no constant speed"):
-        VelocityMap.of(SLIDE.axes["x"], motion_of(log, "x", "log"))
+SPEEDS = np.array([0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.03, 0.1, 0.2, 0.3])
+
+
+def one_way(speeds, noise: float, seed: int, repeats: int = 3):
+    rng = np.random.default_rng(seed)
+    speed = np.repeat(speeds, repeats) * (1.0 + 1e-4 * rng.standard_normal(repeats * len(speeds)))
+    friction = CURVE(speed) + noise * rng.standard_normal(len(speed))
+    return speed, friction, np.full(len(speed), 100.0)
+
+
+def test_the_intervals_of_a_curve_hold_the_truth_as_often_as_they_say() -> None:
+    """90 % of them; 25 maps leave 79 to 99 % to chance at two standard errors."""
+    true = {name: getattr(CURVE, name) for name in NAMES}
+    held = []
+    for seed in range(25):
+        found = curve_through(*one_way(SPEEDS, 1e-3, seed))
+        held += [abs(found.values[n] - true[n]) <= found.half[n] for n in NAMES]
+    assert 0.79 <= np.mean(held) <= 0.99
+
+
+def test_few_fast_speeds_are_a_line_and_plateaus_at_one_speed_count_once() -> None:
+    fast = one_way(np.array([0.1, 0.2, 0.3]), 1e-4, 1)
+    found = curve_through(*fast)
+    assert tuple(found.half) == LINE
+    assert found.values == pytest.approx({"Fc": 0.285, "sigma2": 0.018}, rel=0.05)
+    with pytest.raises(InputError, match="3 plateaus at 1 speed in"):
+        curve_through(*one_way(np.array([0.1]), 1e-4, 1))
+
+
+def test_a_curve_has_the_intervals_of_least_squares() -> None:
+    """By the scatter about the curve over its slopes; a plateau weighs by its samples."""
+    scatter = 1e-5 * np.random.default_rng(4).standard_normal(len(SPEEDS))
+    samples = np.linspace(50.0, 150.0, len(SPEEDS))
+    found = stribeck_through(SPEEDS, CURVE(SPEEDS) + scatter, samples)
+    assert list(found.values.values()) == pytest.approx(astuple(CURVE)[:4], rel=1e-2)
+    columns, weight = found.curve.slopes(SPEEDS), np.diag(samples)
+    left, freedom = found(SPEEDS) - CURVE(SPEEDS) - scatter, len(SPEEDS) - 4
+    covariance = np.linalg.inv(columns.T @ weight @ columns) * (left @ weight @ left) / freedom
+    expected = stdtrit(freedom, 0.95) * np.sqrt(np.diag(covariance))
+    assert [found.half[n] for n in NAMES] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_curve_without_noise_is_found_exactly() -> None:
+    found = fit_stribeck(SPEEDS, CURVE(SPEEDS), None)
+    assert astuple(found) == pytest.approx(astuple(CURVE), rel=1e-6)
+    with pytest.raises(InputError, match="four parameters, the map 3 speeds"):
+        fit_stribeck(SPEEDS[:3], CURVE(SPEEDS[:3]))
+
+
+def test_the_slopes_are_those_of_the_curve() -> None:
+    for i, name in enumerate(("Fc", "Fs", "v0", "sigma2")):
+        step = 1e-6 * getattr(CURVE, name)
+        moved = replace(CURVE, **{name: getattr(CURVE, name) + step})
+        change = (moved(SPEEDS) - CURVE(SPEEDS)) / step
+        assert CURVE.slopes(SPEEDS)[:, i] == pytest.approx(change, rel=1e-4, abs=1e-9)
+
+
+LUGRE = fitted("lugre", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018, sigma0=260.0, sigma1=0.6)
+
+
+def test_only_the_dynamic_part_of_a_friction_is_free() -> None:
+    axis = dynamic_part_free(axis_of(fitted("constant_force")).with_effect(LUGRE))
+    assert [c.label for c in free_parameters(axis)] == [f"lugre.{name}" for name in DYNAMIC]
+    with pytest.raises(InputError, match="coulomb_viscous: no friction with a stiffness"):
+        dynamic_part_free(axis_of())
+
+
+def test_both_are_found_from_a_sine_below_the_break_away() -> None:
+    axis = axis_of(mass=15.0).with_effect(LUGRE)
+    quiet = replace(axis, hardware=replace(axis.hardware, current_noise=0.0))
+    machine = MachineModel("slide", {"x": quiet}, 1000.0)
+    sine = OpenLoopSine("x", 6.0, amplitude=0.21, period=3.0)
+    log = simulate(machine, sine, seed=2, simulator=FineSimulator)
+    wrong = machine.with_axis("x", quiet.with_effect(replace(LUGRE, values={
+        **LUGRE.values, "sigma0": 90.0, "sigma1": 3.0})))  # fmt: skip
+    found = identify.dynamic_friction(wrong, {"sine": log})
+    values = found.axis["lugre"].values
+    assert values["sigma0"] == pytest.approx(260.0, rel=2e-3)
+    assert values["sigma1"] == pytest.approx(0.6, rel=2e-2)
+    assert values["Fc"] == 0.285
+    assert found.error < 1e-7

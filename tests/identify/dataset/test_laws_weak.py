@@ -1,15 +1,30 @@
-"""Laws of windows and motions: means and derivatives, exact or of the order that they must be."""
+"""Laws of windows, motions, actuators and encoders: exact, or of the order that they must be."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from constructed import SHORT, log_of, moved, waves
+from constructed import (
+    LAG,
+    PAYLOAD,
+    RIPPLE,
+    SENSING,
+    SHORT,
+    STICKY,
+    effect,
+    log_of,
+    moved,
+    waves,
+    windowed,
+)
 
 from identify.dataset.coordinates import excitation
+from identify.dataset.drive import actual_force, forces_lessened, reading_error, true_motion
 from identify.dataset.motion import SMOOTHED, Motion, motion_of
-from identify.dataset.test_function import LEAST_BLOCKS, TestFunction
+from identify.dataset.test_function import TestFunction
+from identify.estimation.force_balance import averaged_force
 from twin.errors import InputError
+from twin.model.machine import AxisModel
 
 RATE = 4000.0
 PLACE = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))
@@ -35,33 +50,6 @@ def test_windows_have_unit_sum_their_length_and_a_quarters_stride(length, period
     assert every[1].stride == 3 * window.stride
     assert every[1].length == pytest.approx(window.length)
     assert (every[2].period, every[2].stride) == (period, window.stride)
-
-
-def test_a_window_of_too_few_blocks_is_refused():
-    assert len(TestFunction.of_length(LEAST_BLOCKS * 1e-3, 1e-3).weights) == LEAST_BLOCKS
-    with pytest.raises(
-        InputError, match=r"a test function of 0.007 s is shorter than 8 .* at least 0.008 s"
-    ):
-        TestFunction.of_length(7e-3, 1e-3)
-
-
-def test_the_mean_of_a_constant_and_the_acceleration_of_a_line_are_exact():
-    rng = np.random.default_rng(2)
-    a, b, c = rng.normal(size=3)
-    for window in (
-        TestFunction.of_length(0.03, 1e-3),
-        TestFunction.of_length(0.0093, 7e-4).refined(2),
-    ):
-        t = window.period * (np.arange(300) + 0.5)
-        np.testing.assert_allclose(window.mean(np.full(300, c)), c)
-        line = a * t + b
-        starts = np.arange(len(window.mean(t))) * window.stride * window.period
-        np.testing.assert_allclose(window.mean(line), a * (starts + window.length / 2.0) + b)
-        np.testing.assert_allclose(window.acceleration(line), a)
-        rows = np.stack([line, np.full(300, c)])
-        np.testing.assert_array_equal(window.mean(rows)[0], window.mean(line))
-        count = (300 - len(window.weights)) // window.stride + 1
-        assert len(window.mean(line)) == count
 
 
 @pytest.mark.parametrize("parts", [1, 5])
@@ -150,6 +138,8 @@ def test_logs_that_tell_nothing_are_refused():
     with pytest.raises(InputError, match=r"lasts 0.499 s; identification needs 0.5 s"):
         motion_of(log_of(1000.0, x[:499], u[:499]), "x", "n")
     assert motion_of(log_of(1000.0, x[:500], u[:500]), "x", "n").period == 1e-3
+    with pytest.raises(InputError, match=r"0.007 s is shorter than 8 .* at least 0.008 s"):
+        TestFunction.of_length(7e-3, 1e-3)
 
 
 def test_the_noise_of_a_command_is_what_its_controller_did_not_make_of_the_readings():
@@ -187,11 +177,11 @@ def test_the_step_of_rounded_readings_is_found_and_undone():
 def test_the_excitation_covers_all_motions():
     first, second = SMOOTH, replace(moved(np.random.default_rng(6), 1.2), name="b")
     found = excitation([first, second], None)
-    both = [
+    position, velocity = (
         np.concatenate([getattr(m, k) for m in (first, second)]) for k in ("position", "velocity")
-    ]
-    assert (found.position_low, found.position_high) == (both[0].min(), both[0].max())
-    assert found.speed_max == np.abs(both[1]).max()
+    )
+    assert (found.position_low, found.position_high) == (position.min(), position.max())
+    assert found.speed_max == np.abs(velocity).max()
     assert found.duration == pytest.approx(len(first.time) * 1e-3 + len(second.time) * 1e-3)
     assert found.force_max == max(np.abs(m.command).max() for m in (first, second))
     wide = excitation([first], (-0.5, 0.02))
@@ -210,3 +200,83 @@ def test_the_dry_level_is_half_the_gap_between_the_directions():
     assert excitation([pushed(velocity, command)], None).dry_level == pytest.approx(1.1)
     one_way = pushed(np.abs(velocity), command)
     assert excitation([one_way], None).dry_level == pytest.approx(np.median(np.abs(command)))
+
+
+def test_a_lag_follows_its_equation_at_the_logs_own_rate():
+    """tau u' + u = command, held over a sample: a decay by exp(-dt/tau) towards it."""
+    command, dt, tau = SHORT.raw[1], SHORT.sample_period, 1.7e-3
+    u, wanted = command[0], []
+    decay = np.exp(-dt / tau)
+    for c in command:
+        begin, u = u, c + (u - c) * decay
+        wanted.append(c + (begin - c) * (1.0 - decay) * tau / dt)  # the mean over the sample
+    found = actual_force(AxisModel(1.0, effects=(LAG,)), SHORT)
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    np.testing.assert_array_equal(actual_force(AxisModel(1.0, effects=(STICKY,)), SHORT), command)
+
+
+def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_residual():
+    log = windowed(SHORT)
+    for chain in (LAG, RIPPLE):
+        axis = AxisModel(1.0, effects=(chain,))
+        added = log.fine.mean(actual_force(axis, SHORT) - SHORT.raw[1])
+        found = averaged_force(axis, [log])
+        np.testing.assert_allclose(found, added, atol=5e-3 * np.std(added))
+    pushed = AxisModel(1.0, effects=(LAG, effect("constant_force", {"F0": 0.4})))
+    np.testing.assert_allclose(
+        averaged_force(pushed, [log]), 0.4 + averaged_force(AxisModel(1.0, effects=(LAG,)), [log])
+    )
+
+
+def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
+    """A saturation that loses all above its limit lowers a constant command by what it says."""
+
+    def motions(*levels):
+        return [SHORT.with_force(0.0 * SHORT.raw[1] + v) for v in levels]
+
+    limited = effect("actuator_saturation", {"limit": 1.0, "loss": 1.0})
+    axis = AxisModel(1.0, effects=(limited,))
+    assert forces_lessened(axis, motions(1.9)) == 1.0
+    assert forces_lessened(axis, motions(2.1)) == pytest.approx(1.0 / 2.1)
+    assert forces_lessened(axis, motions(4.0, 3.0)) == pytest.approx(np.sqrt(2.0) / 5.0)
+    dead = AxisModel(1.0, effects=(effect("actuator_deadband", {"width": 9.0}),))
+    assert forces_lessened(dead, motions(4.0)) == 1e-6
+
+
+def test_a_late_reading_is_undone():
+    """What was read is x(t - tau): the true motion is the reading tau later."""
+    axis = AxisModel(1.0, effects=(SENSING[0], PAYLOAD))
+    tau, dt = 7.3e-4, SHORT.sample_period
+    true, rate = true_motion(axis, SHORT)
+    at = np.arange(len(rate), dtype=float)
+    ahead = np.interp(at + tau / dt, at, SHORT.raw[0])
+    inner = slice(20, -20)
+    np.testing.assert_allclose(true.raw[0][inner], ahead[inner], atol=2e-3 * np.ptp(ahead))
+    np.testing.assert_allclose(true.raw[0] + rate, SHORT.raw[0], atol=1e-12)
+    np.testing.assert_array_equal(true.raw[1], SHORT.raw[1])
+    assert rate[-1] == 0.0  # nothing is known of what follows
+    means = rate.reshape(len(SHORT.time), -1).mean(axis=1)
+    np.testing.assert_allclose(SHORT.velocity - true.velocity, means, atol=1e-12)
+    seen = SHORT.at_samples(0.0)[0]
+    error = (seen - np.interp(at + tau / dt, at, seen)).reshape(len(means), -1).mean(axis=1)
+    np.testing.assert_allclose((SHORT.position - true.position)[9:-9], error[9:-9], atol=2e-6)
+    np.testing.assert_array_equal(true.command, SHORT.command)
+
+
+def test_a_ripple_of_the_encoder_is_undone():
+    """reading = x + e(x) of a known x gives e(x) back, also where smoothing takes a ripple off."""
+    rate = 2000.0
+    x = waves((3e-3, 1.3, 0.4), (6e-4, 5.1, 1.0))
+    t = np.arange(3000) / rate
+    fastest = np.abs(np.diff(x(t))).max()
+    period = float(12.0 * fastest)  # 12 samples at the highest speed
+    sizes = {n: period * v / 15 for n, v in {"a1": 0.4, "b1": -0.3, "a2": 0.2, "b2": 0.1}.items()}
+    ripple = effect("encoder_ripple", {"period": period, **sizes})
+    turn = 2.0 * np.pi * x(t) / period
+    error = sum(
+        sizes[f"a{k}"] * np.sin(k * turn) + sizes[f"b{k}"] * np.cos(k * turn) for k in (1, 2)
+    )
+    motion = motion_of(log_of(rate, x(t) + error, 0.0 * t), "x", "")
+    found, _ = reading_error(AxisModel(1.0, effects=(ripple,)), motion)
+    inner = slice(30, len(found) - 30)
+    np.testing.assert_allclose(found[inner], error[inner], atol=0.03 * np.abs(error).max())

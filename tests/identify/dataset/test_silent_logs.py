@@ -1,24 +1,29 @@
-"""A log that says nothing is left out with one line, in any role; an error where none is left.
-
-In one planted log the axis hops and rests, so that it rests within every test function; in one it
-stands still; one is of another part of the track.
-"""
+"""What is left out of logs: one that says nothing, and what lies where no training log has been."""
 
 from __future__ import annotations
 
 import json
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from built_fits import axis_of, fitted
 from check_drive import COULOMB, DAMPING, MASS, drive
 from cli_runs import twin
+from constructed import log_of, waves
 
+from identify.dataset.dataset import Dataset
+from identify.dataset.preparation import datasets
+from identify.dataset.prepared_log import moving
+from identify.estimation.alignment import realigned
+from identify.estimation.evidence import rms
+from identify.estimation.fit import error_on, fit_axis
+from identify.output.words.fit import prepared_in_words
 from identify.results.results import FitResult
-from identify.workflow import compare, fit
+from identify.workflow import fit
 from twin.effects import load_catalogue
-from twin.errors import InputError
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
@@ -90,13 +95,6 @@ def test_one_that_shares_no_travel_is_told_beside_one_that_does(caplog):
     assert np.isfinite(error)
 
 
-def test_where_no_log_is_left_it_is_an_error_of_one_line():
-    for call in (fit, compare):
-        with pytest.raises(InputError, match="comes to rest within every test function") as why:
-            call(MODEL, {"hops": SILENT["hops"]}, test_function=LENGTH)
-        assert "\n" not in str(why.value)
-
-
 COMMANDS = (
     ("compare", "m.toml", "run.mcap", "hops.mcap"),
     ("add", "quadratic_drag", "m.toml", "run.mcap", "--test", "hops.mcap", "-o", "o.toml"),
@@ -116,3 +114,54 @@ def test_each_command_says_it_on_standard_error_and_in_json(tmp_path: Path):
         for line in told["left_out"]:
             assert f"twin: {line}\n" in done.stderr
         assert "NaN" not in done.stdout
+
+
+RATE, SECONDS = 1000.0, 6.0
+SPRUNG = axis_of(fitted("cable_slab", k1=1.0))
+
+
+def step_beyond(x):
+    """A force (N) where the logs to fit do not go: x > 40 mm."""
+    return np.where(x > 0.04, 0.5, 0.0)
+
+
+def log(centre: float, phase: float, force=step_beyond):
+    """Two waves of 30 mm in all about a centre (m), under a mass, friction and a force of place."""
+    t = np.arange(round(SECONDS * RATE)) / RATE
+    wave = waves((0.02, 0.5, phase), (0.01, 1.3, 2.0 * phase))
+    x, h = centre + wave(t), 1e-5
+    v = (wave(t + h) - wave(t - h)) / (2.0 * h)
+    a = (wave(t + h) - 2.0 * wave(t) + wave(t - h)) / h**2
+    noise = 1e-3 * np.random.default_rng(round(1e3 * phase)).standard_normal(len(t))
+    return log_of(RATE, x, 5.3 * a + 0.31 * np.sign(v) + 0.53 * v + force(x) + noise)
+
+
+def dataset_of(*centres: float) -> Dataset:
+    fit = {"one": log(0.0, 0.3), "two": log(0.0, 1.1)}
+    held = {f"held {i}": log(c, 2.0 + i) for i, c in enumerate(centres)}
+    return datasets(MachineModel("m", {"x": SPRUNG}), fit, held, test_function=0.05)["x"]
+
+
+def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
+    inside, beyond = dataset_of(0.0), dataset_of(0.02)
+    assert inside.beyond == {}
+    errors = [rms(error_on(fit_axis(SPRUNG, d.fit).axis, d.holdout)) for d in (inside, beyond)]
+    assert errors[1] == pytest.approx(errors[0], rel=0.5)  # the step of 0.5 N is not met
+    (part,) = beyond.beyond.values()
+    (held,) = beyond.holdout
+    assert part == pytest.approx(1.0 - np.mean(moving([held], sticks=False)))
+    position = held.test_function.mean(held.motion.position)
+    assert position[~held.reached].min() > 0.03
+    assert 0.2 < part < 0.6
+    (told,) = [text for text in prepared_in_words(beyond) if "selection log" in text]
+    assert told.startswith(f"held 0: {100 * part:.0f} % of this selection log is left out: it lies")
+    tested = replace(beyond, holdout=(), test=beyond.holdout)
+    (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
+    assert "of this test log is left out" in told
+    assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
+
+
+def test_held_out_logs_that_share_little_test_all_the_same() -> None:
+    """Otherwise nothing would be left to test with."""
+    assert dataset_of(0.2).beyond == {}
+    assert set(dataset_of(0.2, 0.0).beyond) == {"held 0"}  # together they share half

@@ -1,22 +1,35 @@
-"""Fits on the twin's own logs: parameters, delay, noise floor, intervals, and a user's effect."""
+"""Fits of the twin's own logs and of the EMPS drive: values, delays, intervals, a user's effect."""
+
+from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from check_drive import drive
+from emps_published import direction_dependent, identify, load, prediction_error, symmetric
 from machines import machine, one_axis
 
+from identify import workflow
 from identify.dataset.preparation import datasets
+from identify.estimation.confounded import Refit
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import OpenSided, Side, estimates
-from identify.selection.trying import try_effect
-from identify.workflow import diagnose
+from identify.output.as_json import json_of
+from identify.output.words.fit import refit_in_words
+from identify.results.results import FitResult
+from identify.validation.agreement import agreement
+from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.model.file import load_model
-from twin.model.machine import Fitted
+from twin.logs import Log
+from twin.logs.log import Array
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 from twin.simulator import ReducedSimulator
 
@@ -87,12 +100,6 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     assert found["end_stop.high"].low <= highest <= found["end_stop.high"].high
 
 
-def test_the_twin_has_no_delay(fitted, dataset):
-    delayed = try_effect(fitted, dataset, CATALOGUE["actuator_delay"])
-    assert not delayed.supported
-    assert delayed.fit.axis["actuator_delay"].values["tau"] < 0.05 * STAGE.period
-
-
 def test_a_users_effect_is_fitted_and_named():
     own = load_catalogue([Path(__file__).parents[3] / "examples" / "my_effect.py"])
     true = {"k": 9.0, "place": 0.043, "w": 0.018}
@@ -120,3 +127,118 @@ def test_a_hidden_effect_of_a_planted_fault_is_not_explained_by_others():
     found = diagnose(STAGE, hidden.logs, hidden.holdout, catalogue=without)
     assert found.effect is None
     assert found.leading.unexplained is not None
+
+
+SAME_FORCE = {"mass": "payload_mass", "cable_slab.offset": "constant_force"}
+
+
+@cache
+def nominal() -> MachineModel:
+    return load_model("proton_xy", CATALOGUE)
+
+
+def stage_with(label: str, value: float) -> MachineModel:
+    """The stage with one number other than the model has it."""
+    axis = nominal().axes["x"]
+    (where,) = (c for c in free_parameters(axis) if c.label == label)
+    return nominal().with_axis("x", write(axis, [where], [value]))
+
+
+@cache
+def logged(label: str, value: float) -> Log:
+    stage = stage_with(label, value)
+    return simulate(stage, "moves", seed=1, duration=6.0, simulator=ReducedSimulator)
+
+
+@cache
+def fit_to(label: str, value: float) -> FitResult:
+    return workflow.fit(nominal(), {"fit": logged(label, value)}, catalogue=CATALOGUE)
+
+
+def refit(label: str, value: float) -> Refit:
+    return fit_to(label, value).refits["x"]
+
+
+@pytest.mark.parametrize(
+    ("label", "value"),
+    [("mass", 15.6), ("cable_slab.offset", 0.6), ("cable_slab.k1", 4.0)],
+)
+def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
+    found = refit(label, value)
+    first = found.changes[0]
+    assert first.label == label
+    assert first.after == pytest.approx(value, rel=0.02)
+    assert found.refitted < 0.2 * found.given
+    assert first.alike == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
+    assert label in str(refit_in_words(found))
+    forces = [change.force for change in found.changes]
+    assert forces == sorted(forces, reverse=True)
+    assert len(forces) <= 3
+    assert forces[-1] > 0.1 * found.given
+    assert forces[0] == pytest.approx((found.given**2 - found.refitted**2) ** 0.5, rel=0.1)
+
+
+def test_true_values_are_not_told_and_what_is_said_to_be_the_same_force_is() -> None:
+    """With the mass held, that effect takes the error to where refitting the mass did."""
+    true = nominal().axes["x"]["cable_slab"].values["offset"]
+    assert refit("cable_slab.offset", true).changes == ()
+    found = refit("mass", 15.6)
+    held = replace(nominal().axes["x"], mass_fixed=True)
+    model = nominal().with_axis("x", held)
+    effect = CATALOGUE[found.changes[0].alike[0]]
+    added = workflow.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
+    assert added.step.fit_error_after < 1.01 * found.refitted
+
+
+FRICTION = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 1.5, "Fs": 1.5, "sigma2": 3.5})
+OFFSET = Fitted.at_start(CATALOGUE["constant_force"])
+
+
+def noisy(columns: dict[str, Array]) -> None:
+    """A force that is read with noise, so that there is a floor."""
+    force = columns["force"]
+    force += np.random.default_rng(5).normal(0.0, 0.2, len(force))
+
+
+@pytest.mark.parametrize(("effects", "refused"), [((FRICTION, OFFSET), False), ((FRICTION,), True)])
+def test_what_is_refused_is_not_written(tmp_path, effects, refused):
+    """The drive has a constant force; without it the model is wrong, and no interval is kept."""
+    model = MachineModel("m", {"x": AxisModel(2.0, Hardware(), effects)}, 1000.0)
+    found = fit(model, {"l": drive(seconds=8.0, change=noisy)})
+    assert (found.fits["x"].ratio > 1.3) is refused
+    save_model(found.model, tmp_path / "m.toml")
+    written = load_model(tmp_path / "m.toml", CATALOGUE)
+    kept = written.intervals["x"].ends
+    told = json_of(found)["axes"]["x"]["parameters"]
+    ends = {label: tuple(p["interval_90"]) for label, p in told.items() if p["interval_90"]}
+    assert kept == ends
+    assert bool(kept) is not refused
+    assert str(found).count("90 % in") == len(kept)
+    if refused:
+        with pytest.raises(InputError, match="its model is wrong: find what it lacks") as why:
+            agreement(written, written, Catalogue([]))
+        assert "\n" not in str(why.value)
+
+
+PUBLISHED = {  # M, Fv, Fc, offset; M, Fv+, Fc+, Fv-, Fc-
+    symmetric: (["95.1089", "203.5034", "20.3935", "-3.1648"], "4.0834 %"),
+    direction_dependent: (["95.1540", "166.7061", "20.1440", "240.4236", "20.6277"], "3.1117 %"),
+}
+
+
+def percent(ratio: float) -> str:
+    return f"{100 * ratio:.4f} %"
+
+
+def test_values_and_errors_are_those_published(shared_data: Path) -> None:
+    run, pulses = (
+        load(shared_data / "emps" / f"{n}.mat") for n in ("DATA_EMPS", "DATA_EMPS_PULSES")
+    )
+    predicted = []
+    for model, (values, error) in PUBLISHED.items():
+        estimate = identify(run, model)
+        assert [f"{value:.4f}" for value in estimate.parameters] == values
+        assert percent(estimate.relative_error) == error
+        predicted.append(prediction_error(pulses, model, estimate.parameters))
+    assert percent(predicted[0]) == "5.9824 %"
+    assert predicted[1] < 0.9 * predicted[0]

@@ -1,22 +1,28 @@
-"""Laws of what a residual depends on, and of a force that repeats along the track."""
+"""What a residual depends on, what repeats in it, and when it is noise."""
+
+from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from built_fits import PLAIN, built_dataset
 from constructed import dataset_of, effect, fit_of, moved, ridden, windowed
 
 from identify.dataset.coordinates import coordinates_of
+from identify.estimation.fit import Outcome, finished
 from identify.estimation.residual_dependence import (
     BINS,
     Repeat,
     dependences,
     find_dependence,
-    line,
     not_general,
     share,
 )
+from identify.estimation.residual_noise import is_noise as noise_is_left
+from identify.estimation.residual_noise import noise_known, with_own_noise
+from identify.output.words.fit import prepared_in_words
 from identify.output.words.residual import repeat_in_words
 from twin.model.machine import AxisModel
 
@@ -33,20 +39,6 @@ def test_the_share_of_noise_is_none_and_of_a_function_all():
     assert share(fine, x) > 0.4  # the finest bins see it
     few = slice(0, 5 * BINS[1])
     assert share(fine[few], x[few]) < 0.3  # too few for them
-
-
-def test_a_line_of_the_residual_has_its_period_and_share():
-    period = 0.0043
-    x = RNG.uniform(-0.05, 0.1, 3000)
-    r = 0.5 * np.sin(2.0 * np.pi * x / period + 0.7) + RNG.normal(0.0, 0.2, 3000)
-    found, strength = line(r, x)
-    resolved = 1.1 * period / (4.0 * np.ptp(x))  # quarters of a cycle over the span
-    assert found == pytest.approx(period, rel=resolved)
-    assert strength == pytest.approx(0.125 / (0.125 + 0.04), abs=0.08)
-    moved_, again = line(7.0 * r, 3.0 * x + 1.0)
-    assert (moved_, again) == pytest.approx((3.0 * found, strength), rel=1e-6)
-    assert line(RNG.normal(size=3000), x) is None
-    assert line(r, 0.0 * x) is None
 
 
 LONG = [windowed(moved(np.random.default_rng(s), 6.0, 1000.0), 0.02) for s in (1, 2)]
@@ -123,3 +115,98 @@ def test_a_force_with_another_phase_in_each_log_is_told():
     assert not_general(fit, other) is None
     none = dataset_of(log(0.3, "a"), log(1.8, "b", size=0.0))
     assert not_general(fit, none) is None
+
+
+SIZE = 0.05  # N RMS, far above what sensors make here
+
+
+def slow_noise(rng, n: int):
+    """First-order noise (n,) of unit RMS, correlated over some three test functions."""
+    out, keep = np.zeros(n), np.exp(-0.3)
+    for k, drawn in enumerate(rng.standard_normal(n)):
+        out[k] = keep * out[k - 1] + np.sqrt(1.0 - keep**2) * drawn
+    return out
+
+
+def left(force, held=("held",), seed=8):
+    """A dataset on which the plain axis leaves force(log, rng) (n,) N."""
+    rng = np.random.default_rng(seed)
+
+    def moved(log):
+        own = finished(PLAIN, PLAIN, (log,), Outcome.CONVERGED)
+        rest = np.zeros(len(log))
+        rest[own.kept] = own.residual
+        return replace(log, command=log.command - rest + force(log, rng))
+
+    data = built_dataset("one", "two", held=held)
+    return replace(data, fit=tuple(map(moved, data.fit)), holdout=tuple(map(moved, data.holdout)))
+
+
+def noise(log, rng):
+    return SIZE * slow_noise(rng, len(log))
+
+
+def of_place(log, rng):
+    return noise(log, rng) + SIZE * np.sign(log.test_function.mean(log.motion.position))
+
+
+def of_speed(log, rng):
+    return noise(log, rng) * (1.0 + 4.0 * (log.test_function.mean(log.motion.velocity) > 0.0))
+
+
+def chirp(log, rng):
+    """A tone that moves from 5 to 25 Hz, of constant amplitude."""
+    time = log.time
+    return np.sqrt(2.0) * SIZE * np.sin(2.0 * np.pi * (5.0 + 10.0 * time / time[-1]) * time)
+
+
+def bursts(log, rng):
+    """A force that acts now and then, for some test functions."""
+    return 6.0 * SIZE * rng.standard_normal(len(log)) * (np.arange(len(log)) % 97 < 4)
+
+
+def fit_to(data):
+    return finished(PLAIN, PLAIN, data.fit, Outcome.CONVERGED)
+
+
+@pytest.mark.parametrize("held", [("held",), ()], ids=["held out", "left out"])
+@pytest.mark.parametrize(
+    ("force", "is_noise"),
+    [(noise, True), (of_place, False), (of_speed, False), (chirp, False), (bursts, False)],
+)
+def test_only_what_nothing_foretells_is_noise(force, is_noise, held):
+    data = left(force, held)
+    fit = fit_to(data)
+    assert fit.ratio > 2.0
+    assert noise_is_left(fit, data) is is_noise
+    known, again = with_own_noise(fit, data)
+    assert (known is data) is not is_noise
+    assert again.at_floor is is_noise
+
+
+def test_noise_is_part_of_the_floor_and_said():
+    data = left(noise)
+    fit = fit_to(data)
+    known = noise_known(PLAIN, data)
+    assert known.force_noise == pytest.approx(np.sqrt(fit.error**2 - fit.floor**2))
+    assert fit_to(known).ratio == pytest.approx(1.0)
+    assert "force noise that no sensor explains" in prepared_in_words(known)[0]
+    assert fit_to(known.with_force_noise(0.0)).floor == pytest.approx(fit.floor)
+    assert all(log.force_noise == known.force_noise for log in known.logs)
+
+
+def test_one_log_or_one_that_is_larger_where_held_out_does_not_show_noise():
+    data = left(noise)
+    alone = replace(data, fit=data.fit[:1], holdout=())
+    assert not noise_is_left(fit_to(alone), alone)
+    more = tuple(replace(log, command=2.0 * log.command) for log in data.holdout)
+    assert not noise_is_left(fit_to(data), replace(data, holdout=more))
+
+
+def test_no_noise_of_many_is_refused_often():
+    """One in 41 by chance of the controls, of each of two questions."""
+    told = []
+    for seed in range(12):
+        data = left(noise, seed=seed)
+        told.append(noise_is_left(fit_to(data), data))
+    assert sum(told) >= 11

@@ -142,14 +142,11 @@ def test_inside_and_outside_undo_each_other():
         axis = scaling.outside(ODD, drawn)
         assert axis["lugre"].values["Fs"] >= axis["lugre"].values["Fc"]
         np.testing.assert_allclose(scaling.inside(axis), drawn, rtol=1e-9, atol=1e-9)
-    for c, a, b, log in zip(where, low, high, scaling.is_logarithm(), strict=True):
+    for c, *ends, log in zip(where, low, high, scaling.is_logarithm(), strict=True):
         p = c.parameter
+        bounds = [0.0, p.upper - p.lower] if p.name == "Fs" else [p.lower, p.upper]
         assert log == (p.lower > 0 and p.name != "Fs")
-        if p.name == "Fs":
-            assert (a, b) == (0.0, p.upper - p.lower)
-        else:
-            wanted = np.log([p.lower, p.upper]) if log else [p.lower, p.upper]
-            np.testing.assert_allclose([a, b], wanted)
+        np.testing.assert_allclose(ends, np.log(bounds) if log else bounds)
 
 
 def test_the_chain_rule_is_the_difference_by_the_internal_variables():

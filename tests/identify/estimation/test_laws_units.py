@@ -135,28 +135,6 @@ def test_an_absolute_size_is_seen(fault: str) -> None:
     assert any(differing(effect, *units) for units in UNITS)
 
 
-def bounded(lower: float, upper: float) -> Fit:
-    """A fit of a constant force of some newtons within bounds."""
-    dataset = begun(1.0, 1.0)[1]
-    effect = with_one("constant_force", "F0", lower=lower, upper=upper)
-    return fit_axis(AxisModel(MASS, effects=(Fitted.at_start(effect),)), dataset.fit)
-
-
-def test_a_value_at_its_bound_is_told_and_an_absent_one_is_not() -> None:
-    free = bounded(-50.0, 50.0)
-    value = free.axis["constant_force"].values["F0"]
-    assert at_bounds(free, "constant_force") == ()
-    size = 0.5 * abs(value)
-    assert at_bounds(bounded(-size, size), "constant_force") == ("constant_force.F0",)
-    upper_at_zero, lower_at_zero = bounded(-50.0, 0.0), bounded(0.0, 50.0)
-    absent = upper_at_zero if value > 0.0 else lower_at_zero
-    assert absent.axis["constant_force"].values["F0"] == 0.0
-    assert at_bounds(absent, "constant_force") == ()
-    only = (0.0, size) if value > 0.0 else (-size, 0.0)
-    assert at_bounds(bounded(*only), "constant_force") == ("constant_force.F0",)
-    assert at_bounds(bounded(*only), "another") == ()
-
-
 def test_a_curve_over_speed_is_sought_where_the_motion_is() -> None:
     """What falls far beyond the highest speed is a constant; a value given beyond is kept."""
     p, scale = CATALOGUE["stribeck"].parameter("v0"), Scale(force=20.0, length=0.3, time=1.5)

@@ -15,14 +15,11 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome
 from identify.estimation.open_loop import (
-    Beginning,
     measured_beginning,
-    motion_error,
     simulated_error,
 )
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion, rough_minimum
 from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
-from twin.core.native import AXIS_STATES
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
@@ -92,20 +89,6 @@ def test_unknown_bristles_are_as_sure_as_their_usual_deflection(slide, log) -> N
     assert velocity < 1e-3
     assert max(states) == pytest.approx(2.0, rel=0.3)  # N: this friction's state is its force
     assert begun.first == 5
-
-
-def test_the_error_is_the_simulated_motion_less_the_measured_one(slide, log) -> None:
-    """Without friction a held force gives a parabola, sample by sample."""
-    free = AxisModel(mass=5.0)
-    part = prepared(slide, log)[0]
-    begun = Beginning(5, 0.01, 0.2, np.zeros(AXIS_STATES))
-    error = motion_error(free, part, begun)
-    force = part.motion.raw[1][5:]
-    velocity = 0.2 + np.concatenate([[0.0], np.cumsum(force[:-1] / 5.0 / RATE)])
-    mean = 0.5 * (velocity[1:] + velocity[:-1])
-    position = 0.01 + np.concatenate([[0.0], np.cumsum(mean / RATE)])
-    measured = part.motion.at_samples(0.0)[0][5:]
-    np.testing.assert_allclose(error, position - measured, atol=1e-9)
 
 
 def test_an_effect_of_the_other_axis_is_refused(slide, log) -> None:

@@ -134,15 +134,6 @@ def test_an_object_is_as_it_was_read_and_as_the_schema_says(name: str) -> None:
     valid(found)
 
 
-def test_a_diagnosis_is_that_of_its_leading_axis() -> None:
-    found = printed("diagnosis")
-    of_all = {"axes", "body", "data_faults", "left_out", "schema"}
-    own = {k: v for k, v in found.items() if k not in of_all}
-    assert list(found["axes"]) == ["y", "x"]
-    assert own == found["axes"]["x"]
-    assert [f["confidence"] for f in own["findings"]] == [f.confidence for f in made.FOUND]
-
-
 def test_what_is_no_number_or_no_law_is_told() -> None:
     c = replace(made.comparison_of(), position_floor={"run 1": 0.0, "run 2": 0.0})
     found = told(made.Comparison(made.MODEL, {"x": c}))

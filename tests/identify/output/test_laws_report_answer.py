@@ -147,6 +147,15 @@ def test_a_comparison_alone_says_whether_the_error_is_noise(error, tone):
     assert (tone is Tone.PLAIN) or f"force error {number(error)} times" in card.headline
 
 
+def test_regions_have_headings_only_among_axes_with_regions():
+    quiet = made.comparison_of("y")
+    quiet = replace(quiet, residual=np.full(len(quiet.residual), 0.001))
+    for y, expected in ((made.comparison_of("y"), ["Axis x", "Axis y"]), (quiet, ["Axis x"])):
+        compared = made.Comparison(made.MODEL, {"x": made.comparison_of(), "y": y})
+        text = page_of(Subject("t", None, compared, (), ())).texts["regions"]
+        assert [name for name in ("Axis x", "Axis y") if name in text] == expected
+
+
 @pytest.mark.parametrize("kept", [True, False])
 def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     first, *rest = cards(additions=(replace(made.addition(), kept=True), made.addition(kept)))
@@ -162,16 +171,6 @@ def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
     assert (first.sentence == "The logs prove the effect.") is kept
     assert ("gain uncertain: t = 1.3, where 1.6 is sure" in first.sentence) is not kept
     assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
-
-
-def test_the_worst_regions_are_in_the_order_of_what_is_printed():
-    shown = page_of(subject_of()).table("regions", 0)
-    titles = ["RMS error", "Times noise floor", "Share of squared error", "Share of time"]
-    assert {where: [row[t] for t in titles] for where, row in shown.items()} == {
-        "Position between 12.3 and 25.7 mm": ["121 mN", "14.3", "37 %", "0 %"],
-        "Moving backwards": ["87.0 mN", "7.70", "53 %", "0 %"],
-    }
-    assert [row["Difference"] for row in shown.values()] == ["37 %", "53 %"]
 
 
 @pytest.mark.parametrize(
@@ -190,20 +189,6 @@ def test_the_worst_regions_are_in_the_order_of_what_is_printed():
 def test_a_place_is_named_with_the_digits_of_its_width(changed, said):
     _, back = made.comparison_of().worst
     assert place_in_words(replace(back, **changed)) == said
-
-
-def test_regions_have_headings_only_among_several_axes():
-    quiet = made.comparison_of("y")
-    quiet = replace(quiet, residual=np.full(len(quiet.residual), 0.001))
-    for axes, expected in (
-        ({"x": made.comparison_of(), "y": made.comparison_of("y")}, ["Axis x", "Axis y"]),
-        ({"x": made.comparison_of(), "y": quiet}, ["Axis x"]),
-        ({"x": made.comparison_of()}, []),
-    ):
-        subject = Subject("t", None, made.Comparison(made.MODEL, axes), (), ())
-        text = page_of(subject).texts["regions"]
-        assert [name for name in ("Axis x", "Axis y") if name in text] == expected
-        assert "Where the error is" in text
 
 
 def test_notes_are_said_once():

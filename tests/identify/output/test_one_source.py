@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import built_results as made
 import numpy as np
 import pytest
 from built_results import Page
@@ -14,12 +15,13 @@ from report_cases import Case, Outline, cogging_case
 from identify import workflow
 from identify.estimation.fit import Outcome, finished
 from identify.output.as_json import json_of
-from identify.output.numbers import PREFIXES, capitalised, title_case, typeset
+from identify.output.numbers import PREFIXES, capitalised, quantity, title_case, typeset
 from identify.output.report import facts, sections
 from identify.output.report.explorer import explored
 from identify.output.report.page import page as whole
 from identify.results.results import FitResult
 from twin.effects import load_catalogue
+from twin.errors import InputError
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
 
@@ -190,12 +192,41 @@ def load_written(model: MachineModel, folder: Path) -> MachineModel:
     return load_model(folder / "m.toml", load_catalogue())
 
 
-def test_what_effects_do_alone_and_together_is_said_and_that_more_is_missing(case: Case) -> None:
-    (own,) = case.x.findings
-    half = replace(own, explains=0.04, effect="cogging_2", left=9.58)
-    found = case.concluding(replace(case.x, findings=(own, half)))
-    page = Outline(found._repr_html_() or "").text
-    for said in (str(found), page):
-        assert re.search(r"All together|together they explain 100 %", said)
-    more = case.concluding(replace(case.x, findings=(replace(own, left=9.58),)))
-    assert "9.58 times on the selection logs: something else is missing too." in str(more)
+def shown(result: object) -> str:
+    """The visible text of what a notebook shows, in which nothing is run or loaded."""
+    html = result._repr_html_()  # type: ignore[attr-defined]
+    outline = Outline(html)
+    assert not {"script", "style", "link", "img", "button"} & set(outline.tags)
+    return re.sub(r"\s+", " ", outline.text)
+
+
+def test_each_result_shows_what_its_text_says(case: Case) -> None:
+    text = shown(case.diagnosis)
+    assert "Axis x: cogging is missing" in text
+    assert typeset(quantity(case.x.tested.before, "N")) in text
+    assert "cogging.p" in text
+    assert "run 1" in shown(case.diagnosis.comparison)
+    log = case.fit["run 1"]
+    assert f"xpositionm{log.axes['x'].position.min():.4g}" in shown(log)
+    text = shown(workflow.fit(case.model, case.fit, case.held))
+    assert "coulomb_viscous.Fc" in text
+    assert "No interval: the force error" in text
+    assert "5.23 to 5.47" in shown(made.fit_result())
+
+
+def test_the_residual_is_drawn_over_the_coordinate_of_the_answer_or_any_other(case: Case) -> None:
+    found = case.diagnosis
+    (own,) = found.plot().axes
+    assert own.get_xlabel().startswith("Cogging phase (")
+    (place,) = found.residual.against("position", axis="x").axes
+    assert (place.get_xlabel(), place.get_ylabel()) == ("Position (mm)", "Unexplained force (mN)")
+    dots, means, *_ = place.lines
+    errors = np.asarray(dots.get_ydata(), dtype=float)
+    rms = np.sqrt(np.nanmean(errors**2))  # of all logs, mN
+    assert 1e3 * min(found.summaries["x"].chosen.before, case.x.base.error) < rms < 80.0
+    assert np.nanmax(np.abs(np.asarray(means.get_ydata(), dtype=float))) < np.nanmax(np.abs(errors))
+    (alone,) = found.comparison.residual.against("time").axes
+    assert len(alone.lines) == 2  # of one model
+    for wrong in ({"coordinate": "phase"}, {"coordinate": "position", "axis": "y"}):
+        with pytest.raises(InputError, match=r"known are time, |no axis 'y' in the result"):
+            found.residual.against(**wrong)
