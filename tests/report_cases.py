@@ -7,10 +7,12 @@ from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
+import built_results as made
+
 from identify import workflow
-from identify.output.report import write_report
+from identify.output.report import SECTIONS, facts, sections, write_report
 from identify.output.report.answer import cards
-from identify.output.report.page import Answer
+from identify.output.report.page import Answer, page
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis, summary_of
@@ -123,3 +125,19 @@ class Outline(HTMLParser):
 
 def answers(subject: Subject) -> list[Answer]:
     return [b for view in subject.views for b in cards(view) if isinstance(b, Answer)]
+
+
+TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
+
+
+def subject_of(
+    diagnosis: Diagnosis | None = None, *, history=made.STEPS, additions=(), **changes: object
+) -> Subject:
+    """The subject of a report of built results."""
+    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
+
+
+def page_of(subject: Subject, anchors: tuple[str, ...] = TABLES) -> made.Page:
+    """Its page with these sections, read back."""
+    shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
+    return made.Page(page(subject.title, facts(subject), shown))

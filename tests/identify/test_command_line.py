@@ -29,7 +29,6 @@ STAGE = (models_folder() / "proton_xy.toml").read_text()
 
 @pytest.fixture(scope="module")
 def recorded() -> Log:
-    """A short log of the twin."""
     model = replace(load_model("proton_xy"), sample_rate=RATE)
     return simulate(model, "tracking", seed=3, duration=4.0)
 
@@ -54,7 +53,6 @@ def folder(recorded, tmp_path) -> Path:
 
 @pytest.fixture
 def cli(tmp_path) -> Cli:
-    """Runs `twin` in an empty folder: exit code, standard output and standard error."""
 
     def run(*arguments: object) -> tuple[int, str, str]:
         done = twin(*arguments, folder=tmp_path)

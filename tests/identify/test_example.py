@@ -88,7 +88,6 @@ def test_every_example_file_is_offered_and_travels_with_the_package() -> None:
 
 @pytest.mark.slow
 def test_a_demonstration_hides_what_it_finds_again(tmp_path):
-    """By its command, among few effects."""
     own = MachineModel("s", {"x": replace(SLIDE, hardware=HARDWARE)}, 1000.0)
     save_model(own, tmp_path / "m.toml")
     asked = ("demo", "-o", "new", "--seed", "3", "--model", "m.toml")

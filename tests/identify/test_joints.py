@@ -34,7 +34,6 @@ NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Two logs, the user's MJCF file, and the model that `twin new` made of them."""
     folder = tmp_path_factory.mktemp("arm")
     (folder / "arm.xml").write_text(ARM)
     for seed in (1, 2):

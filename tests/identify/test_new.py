@@ -68,7 +68,6 @@ def hopping(static: float, offset: float, seed: int = 4) -> Log:
 
 
 def values_of(log: Log) -> dict[str, float]:
-    """Every value of the first model of a log."""
     axis = first_model({"l": log}, "m", CATALOGUE).axes["a"]
     own = {k: v for f in axis.effects for k, v in f.values.items()}
     return {"mass": axis.mass, **own}
@@ -149,7 +148,6 @@ def test_the_emps_drive_has_the_published_values(shared_data):
 
 
 def test_the_commands_of_a_new_machine(tmp_path):
-    """From a table to a model to begin with: guess, import, new."""
     log = drive().axes["a"].columns
     rows = np.column_stack([T, 1e3 * log["position"], log["force"]])
     table = tmp_path / "run.csv"

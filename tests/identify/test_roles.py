@@ -96,7 +96,6 @@ def test_an_addition_tells_the_errors_on_the_logs_of_each_role(found):
 
 
 def test_logs_are_prepared_alike_in_each_role():
-    """What a log is as a test log it is as a selection log."""
     tested = datasets(STAGE, LOGS, {}, test=TEST)["x"]
     chosen = datasets(STAGE, LOGS, TEST)["x"]
     assert (tested.tested_on, tested.chosen_on) == (Role.TEST, Role.TRAINING)

@@ -186,7 +186,6 @@ def jointed(text: str) -> Replay:
 
 
 def test_an_arm_whose_shapes_are_not_there_is_drawn_as_rods() -> None:
-    """From joint to joint, however its file describes them."""
     shapes = ARM.replace("<worldbody>", '<asset><mesh name="m" file="m.stl"/></asset><worldbody>')
     missing = shapes.replace("</body>", '<geom type="mesh" mesh="m"/></body>', 1)
     stages = [Stage.of(jointed(text)) for text in (ARM, missing)]

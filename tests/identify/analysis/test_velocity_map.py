@@ -44,7 +44,6 @@ CURVE = StribeckCurve(0.285, 0.335, 0.01, 0.018)
 
 
 def moves(place: float) -> dict[str, Log]:
-    """A log of moves to and fro at each of two speeds."""
     return {
         f"{place} {speed}": simulate(
             ONE, Staircase("x", speeds=(speed,) * 2, span=0.01, longest_plateau=1e4, at=(place,)),

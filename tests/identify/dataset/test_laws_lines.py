@@ -75,7 +75,6 @@ def test_a_line_has_its_frequency_share_and_a_small_false_alarm(spacing):
 
 
 def test_records_share_a_line_whatever_its_phase_in_each():
-    """A line too weak for one record alone is told by several."""
     rng, t = np.random.default_rng(12), np.arange(2000.0)
     parts = [
         Record(t, 0.13 * np.sin(2.0 * np.pi * 0.0817 * t + k) + rng.normal(size=2000))

@@ -46,7 +46,6 @@ def logged(model: MachineModel, seed: int = 1, seconds: float = 4.0, run: str = 
 
 
 def changed(log: Log, **columns) -> Log:
-    """The log with columns of x made by functions of those that it has."""
     x = log.axes["x"]
     new = {name: make(x.columns.get(name)) for name, make in columns.items()}
     return replace(log, axes={**log.axes, "x": replace(x, columns={**x.columns, **new})})
@@ -86,7 +85,6 @@ def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
 
 @pytest.mark.parametrize("other", [(2000, 6000), (5000, 8000)])
 def test_a_log_that_holds_a_stretch_of_a_fitted_one_is_refused(other):
-    """A log that was cut, or two that overlap."""
     log = logged(STAGE)
     with pytest.raises(InputError, match=r"b: held out, but has samples of a, which is fitted"):
         datasets(STAGE, {"a": log.part(0, 7000)}, {"b": log.part(*other)})

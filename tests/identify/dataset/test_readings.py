@@ -40,7 +40,6 @@ DT = 1e-4  # s
 
 @cache
 def dataset_of(step: float) -> Dataset:
-    """Two logs and a held-out one of a machine whose encoder has that resolution."""
     axis = STAGE.axes["x"]
     if step:
         effect = CATALOGUE["encoder_quantization"]
@@ -145,7 +144,6 @@ def test_a_ripple_is_found_at_any_speed_and_taken_off(path, period):
 
 
 def test_the_log_with_the_longest_travel_tells_the_ripples_of_all():
-    """A log that hardly moves shows none, and all are of one encoder."""
     period = 2.2e-5
     paths = (1e-5 * np.sin(ANGLE), PATHS["turning"])
     read = [p + 2.3e-8 * np.sin(2.0 * np.pi * p / period) + noise() for p in paths]
@@ -194,7 +192,6 @@ READ, TOLD = 2e-4, 2e-2  # m and m/s RMS
 
 
 def speed(t):
-    """The rate of PLACE, m/s, by central differences of a tenth of a sample."""
     return (PLACE(t + 5e-5) - PLACE(t - 5e-5)) / 1e-4
 
 

@@ -50,7 +50,6 @@ def still() -> Log:
 
 
 def elsewhere(part: float) -> Log:
-    """The drive, of which a part of the log is beyond the travel of the others."""
     return drive(change=lambda c: c.update(position=c["position"] + part))
 
 
@@ -162,6 +161,5 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
 
 
 def test_held_out_logs_that_share_little_test_all_the_same() -> None:
-    """Otherwise nothing would be left to test with."""
     assert dataset_of(0.2).beyond == {}
     assert set(dataset_of(0.2, 0.0).beyond) == {"held 0"}  # together they share half

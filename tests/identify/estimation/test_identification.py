@@ -195,7 +195,6 @@ OFFSET = Fitted.at_start(CATALOGUE["constant_force"])
 
 
 def noisy(columns: dict[str, Array]) -> None:
-    """A force that is read with noise, so that there is a floor."""
     force = columns["force"]
     force += np.random.default_rng(5).normal(0.0, 0.2, len(force))
 

@@ -41,7 +41,6 @@ def test_what_the_data_cannot_separate_stays_small():
 
 
 def one_way(speed: float, seed: int):
-    """A log of an axis that goes one way at one speed."""
     motion = moved(np.random.default_rng(seed), 1.5, 1000.0)
     signals = motion.signals.copy()
     signals[0] = speed * np.arange(signals.shape[1]) * motion.period
@@ -50,7 +49,6 @@ def one_way(speed: float, seed: int):
 
 
 def made_for(axis: AxisModel):
-    """Logs whose command is what this axis leaves nothing of."""
     logs = []
     for log in LOGS:
         found = residual(replace(axis), [log])

@@ -54,7 +54,6 @@ def planted(effect: str, **values: float) -> Dataset:
     ],
 )
 def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effect, values):
-    """However many shapes there are, and although most are seen on the heads of the logs alone."""
     dataset, effect = planted(effect, **values), CATALOGUE[effect]
     base = fit_axis(PLAIN, dataset.fit)
     shapes = list(tried_shapes(effect, with_what_repeats(base, dataset)))
@@ -113,7 +112,6 @@ def test_a_start_leaves_what_joint_least_squares_leave(dataset, base, name):
 
 
 def test_a_strength_stops_at_its_bound():
-    """A drag that pushes: none is the nearest that there is."""
     log = PreparedLog.of(pushed(built_motion("one", 3.0, 1), fitted("quadratic_drag", c=5.0)), 0.04)
     log = replace(log, command=log.command - 2.0 * residual(PLAIN, [log]))
     dataset = replace(built_dataset(), fit=(log,))

@@ -66,7 +66,6 @@ def logged() -> tuple[Array, Array, Array]:
 
 @cache
 def begun(length: float, force: float, rubs: bool = True) -> tuple[Fit, Dataset]:
-    """The friction, if any, fitted to the log in these units."""
     x, y, command = logged()
     friction = in_units(Fitted.at_start(CATALOGUE["coulomb_viscous"], FRICTION), length, force)
     axis = AxisModel(2.0 * MASS * force / length, effects=(friction,) if rubs else ())
@@ -77,7 +76,6 @@ def begun(length: float, force: float, rubs: bool = True) -> tuple[Fit, Dataset]
 
 
 def of_friction(effect: Effect) -> bool:
-    """Whether the effect is another than a friction has in itself."""
     return effect.suits is None or effect.suits((CATALOGUE["coulomb_viscous"],), False) == (
         effect.suits((), False)
     )
@@ -85,7 +83,6 @@ def of_friction(effect: Effect) -> bool:
 
 @cache
 def fitted_in(effect: Effect, length: float, force: float) -> Fit:
-    """The effect fitted from its best start in these units."""
     base, dataset = begun(length, force, of_friction(effect))
     start = starts(base, dataset, effect)[0]
     return fit_axis(base.axis.with_effect(start.fitted), dataset.fit)

@@ -69,7 +69,6 @@ def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:
 
 
 def test_a_log_that_begins_in_motion_is_begun_as_it_was(slide, log) -> None:
-    """Cut where the axis moves and its bristles are bent: all of that is estimated."""
     columns = {name: column[700:] for name, column in log.axes["x"].columns.items()}
     late = Log(RATE, {"x": AxisLog(columns)})
     part = prepared(slide, late)

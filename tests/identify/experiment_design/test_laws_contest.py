@@ -45,13 +45,11 @@ def arena(*explanations: Explanation, logs=(OLD,), test_function=0.04) -> Arena:
 
 
 def judged(among: Arena, experiment=TRACKED):
-    """The experiment as it is judged, and the logs that it is judged on."""
     (found,), _ = contest(among, [experiment])
     return found, among.logs_with(found.motion.motion)
 
 
 def absorbed(force, columns):
-    """What least squares leaves of a force."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     return force - scaled @ np.linalg.lstsq(scaled, force, rcond=1e-12)[0]
 

@@ -98,7 +98,6 @@ def logged(machine: MachineModel, experiment: Experiment, seed: int) -> Logs:
 
 
 def separation(ranking) -> float:
-    """Evidence of the best explanation over the other."""
     return ranking[0].delta_bic - ranking[1].delta_bic
 
 
@@ -171,7 +170,6 @@ def test_without_rivals_the_experiment_says_most_about_the_model():
 
 
 def test_only_what_a_refit_leaves_counts() -> None:
-    """Two models that differ in values that a refit takes over are not told apart."""
     stage = stage_of()
     x = stage.axes["x"]
     lugre = {**x["lugre"].values, "Fc": 0.3, "Fs": 0.36, "sigma2": 0.03}

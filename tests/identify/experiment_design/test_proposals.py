@@ -46,7 +46,6 @@ RATE = 2500.0  # Hz, of the machines that are identified: quicker than 10 kHz, a
 
 
 def with_limits(**changed: float | tuple[float, float] | None) -> MachineModel:
-    """The stage with other limits on x."""
     x = PROTON.axes["x"]
     return PROTON.with_axis("x", replace(x, hardware=replace(x.hardware, **changed)))
 

@@ -111,7 +111,6 @@ ANSWERS: dict[str, Callable[[], object]] = {
 
 
 def printed(name: str) -> dict[str, Any]:
-    """The JSON object of a result, as a strict reader gets it."""
     found = ANSWERS[name]()
     if isinstance(found, Answer):
         found = found.entries()

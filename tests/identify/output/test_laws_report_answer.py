@@ -7,14 +7,14 @@ from dataclasses import replace
 import built_results as made
 import numpy as np
 import pytest
-from built_results import Page
+from report_cases import page_of, subject_of
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, capitalised, number, quantity, spaced
-from identify.output.report import SECTIONS, facts, sections
+from identify.output.report import facts
 from identify.output.report.answer import cards as cards_of
 from identify.output.report.answer import notes
-from identify.output.report.page import Tone, page
+from identify.output.report.page import Tone
 from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
 from identify.output.words.diagnosis import VERDICTS, remarks_on
@@ -29,16 +29,6 @@ SEVERAL = (
     "The model lacks several effects: the training logs and the selection logs prove them. The "
     "logs cannot tell cogging from quadratic_drag."
 )
-TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
-
-
-def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
-    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
-
-
-def page_of(subject: Subject) -> Page:
-    shown = sections(subject, [part for part in SECTIONS if part.anchor in TABLES])
-    return Page(page(subject.title, facts(subject), shown))
 
 
 def cards(diagnosis=None, **changes):

@@ -6,27 +6,14 @@ from dataclasses import replace
 
 import built_results as made
 from built_fits import CATALOGUE, axis_of, fitted
-from built_results import Page
+from report_cases import page_of, subject_of
 
 from identify.estimation.intervals import NotExcited, refusal
 from identify.output.numbers import number, title_case
-from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.effects import given_table, growth_table, values_of
-from identify.output.report.page import page
 from identify.output.report.residual import logs
 from identify.output.report.subject import Subject
 from identify.output.words.fit import no_interval_in_words
-
-TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
-
-
-def subject_of(diagnosis=None, *, history=made.STEPS, additions=(), **changes) -> Subject:
-    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
-
-
-def page_of(subject: Subject, anchors=TABLES) -> Page:
-    shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
-    return Page(page(subject.title, facts(subject), shown))
 
 
 def test_the_ledger_shows_each_step_in_its_row_and_column():

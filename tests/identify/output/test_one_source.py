@@ -10,7 +10,7 @@ import built_results as made
 import numpy as np
 import pytest
 from built_results import Page
-from report_cases import Case, Outline, cogging_case
+from report_cases import Case, Outline
 
 from identify import workflow
 from identify.estimation.fit import Outcome, finished
@@ -28,11 +28,6 @@ from twin.model.machine import Fitted, MachineModel
 UNITS = ("N", "m", "kg", "N·s/m")
 QUANTITY = re.compile(r"(−?[\d.]+(?:×10\S+)?) ?(\S*)")
 DIGITS = 0.006  # relative: a printed number has three
-
-
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return cogging_case()
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +110,6 @@ def test_a_diagnosis(page: Page, text: str, told: dict) -> None:
 
 
 def test_the_selection_error_is_one_number(page: Page, text: str, case: Case) -> None:
-    """Though the channel delay was only found with the effect (``cogging_case``)."""
     assert case.x.dataset.channel_delay > 0.0
     before = tiles(text)["Force error, selection logs"].split(" → ")[0]
     row = page.table("ranking")["Cogging"]["Error before"]
@@ -149,7 +143,6 @@ def test_a_fit(fit_of_case: FitResult) -> None:
 
 
 def fitted_table(result: FitResult) -> dict[str, str]:
-    """Values by parameter in a notebook."""
     page = Page(f'<section id="all">{result._repr_html_()}</section>')
     return {name: row["Value"] for name, row in page.table("all").items()}
 

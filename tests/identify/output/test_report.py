@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from report_cases import Case, Outline, cogging_case
+from report_cases import Case, Outline
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, quantity, typeset
@@ -25,11 +25,6 @@ from twin.errors import InputError
 from twin.logs import write_log
 
 MOST_BYTES = 3_000_000
-
-
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return cogging_case()
 
 
 @pytest.fixture(scope="module")

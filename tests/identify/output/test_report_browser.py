@@ -9,18 +9,13 @@ from pathlib import Path
 
 import pytest
 from browser import Browser, browser
-from report_cases import Case, cogging_case
+from report_cases import Case
 
 from identify import workflow
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.machine import Fitted
 from twin.simulator import ReducedSimulator
-
-
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return cogging_case()
 
 
 @pytest.fixture(scope="module")

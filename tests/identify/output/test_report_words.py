@@ -10,7 +10,7 @@ from pathlib import Path
 import built_results as made
 import pytest
 from built_fits import axis_of, built, built_fit, fitted
-from report_cases import Case, Outline, cogging_case
+from report_cases import Case, Outline
 
 from identify import workflow
 from identify.dataset.noise_floor import NoiseFloor
@@ -29,11 +29,6 @@ from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests
 from twin.model.machine import HistoryStep
 from twin.model.units import LINEAR
-
-
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return cogging_case()
 
 
 def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:

@@ -195,13 +195,11 @@ TEXTS: dict[str, Callable[[], object]] = {
 
 
 def texts() -> dict[str, str]:
-    """The texts by name, in a line each of the file after their name."""
     made_now = {name: result() for name, result in TEXTS.items()}
     return {name: r if isinstance(r, str) else text_of(r) for name, r in made_now.items()}
 
 
 def kept() -> dict[str, str]:
-    """The texts of the file."""
     parts = re.split(r"^== (.+)\n", FILE.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
     return {n: text.rstrip("\n") for n, text in zip(parts[::2], parts[1::2], strict=True)}
 

@@ -220,7 +220,6 @@ def test_a_planted_line_has_its_height_in_newtons_in_its_band_alone_which_is_the
 
 
 def test_the_error_by_frequency_is_the_residual_in_its_band():
-    """A sine of known height in the command stands in the band of its frequency alone."""
     log = noisy(14, 1e-3, duration=12.0)
     t = (np.arange(log.motion.raw.shape[1]) + 0.5) / RATE
     for frequency, height in ((7.0, 0.3), (61.0, 0.02)):
