@@ -11,8 +11,7 @@ import built_results as made
 
 from identify import workflow
 from identify.output.report import SECTIONS, facts, sections, write_report
-from identify.output.report.answer import cards
-from identify.output.report.page import Answer, page
+from identify.output.report.page import page
 from identify.output.report.subject import Subject
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis, summary_of
@@ -121,10 +120,6 @@ class Outline(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         self.text += "" if self._apart else data
-
-
-def answers(subject: Subject) -> list[Answer]:
-    return [b for view in subject.views for b in cards(view) if isinstance(b, Answer)]
 
 
 TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")

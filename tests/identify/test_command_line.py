@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -122,29 +123,20 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("fit", "m.toml", "a.mcap", "-o", ""), "-o ''"),
-        (("check", ""), "check ''"),
-    ],
-)
-def test_an_empty_argument_is_no_name(cli, arguments, said):
-    assert cli(*arguments) == (2, "", f"twin: {said}: is empty; give a name\n")
-
-
-@pytest.mark.parametrize(
     ("command", "said"),
     [
         *(
             (f"{command} -o no/where.toml", "no/where.toml: its folder does not exist")
             for command in ("fit m a", "add wear m a", "simulate moves", "recover a", "plan m")
         ),
+        ("fit m.toml a.mcap -o ''", "twin: -o '': is empty; give a name"),
+        ("check ''", "twin: check '': is empty; give a name"),
         ("compare m a -o no/where.html", "no/where.html: its folder does not exist"),
         ("diagnose m a -o a.pdf", "a.pdf: a report is an .html file; give such a name"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
-    code, out, err = cli(*command.split())
+    code, out, err = cli(*shlex.split(command))
     assert (code, out) == (2, "")
     assert said in err
 

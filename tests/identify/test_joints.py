@@ -116,38 +116,27 @@ def test_friction_holds_an_arm_against_its_weight():
     assert np.abs(position).max() < 1e-3
 
 
-def cogging(q, v):
-    """On the shoulder."""
-    return friction(q, v) + np.array([0.0, 0.25 * np.sin(2.0 * np.pi * q[1] / 0.2), 0.0])
-
-
-def counterbalance(q, v):
-    """On the elbow."""
-    return friction(q, v) - np.array([0.0, 0.0, 0.3 * np.sin(q[2] + 0.3)])
-
-
-def coupled(q, v):
-    """The elbow's motor turns with the shoulder as well."""
-    return friction(q, v) - np.array([0.0, 0.0, 0.15 * np.tanh((v[1] + v[2]) / STEEP)])
-
-
 def rotor(model):
-    """Of the elbow."""
-    model.dof_armature[2] = 0.05
+    model.dof_armature[2] = 0.05  # of the elbow
 
 
 HIDDEN = {
     "rotor_inertia": ("elbow", {"change": rotor}),
-    "cogging": ("shoulder", {"forces": cogging}),
-    "gravity": ("elbow", {"forces": counterbalance}),
-    "transmission_coupling": ("elbow", {"forces": coupled}),
-}
+    "cogging": ("shoulder", lambda q, v: [0.0, 0.25 * np.sin(2.0 * np.pi * q[1] / 0.2), 0.0]),
+    "gravity": ("elbow", lambda q, v: [0.0, 0.0, -0.3 * np.sin(q[2] + 0.3)]),  # a counterbalance
+    # The elbow's motor turns with the shoulder as well.
+    "transmission_coupling": (
+        "elbow", lambda q, v: [0.0, 0.0, -0.15 * np.tanh((v[1] + v[2]) / STEEP)],
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", HIDDEN)
 def test_a_hidden_effect_is_named_on_its_joint_and_nowhere_else(folder, effect):
     joint, planted = HIDDEN[effect]
+    if callable(planted):
+        planted = {"forces": lambda q, v: friction(q, v) + HIDDEN[effect][1](q, v)}
     logs = {str(k): arm_log(k, **planted) for k in (1, 2, 3)}
     parts = ({n: logs[n]} for n in "123")
     found = diagnose(load_model(folder / "arm.toml"), *parts)

@@ -101,26 +101,20 @@ def test_a_comparison_for_viewers_is_told_from_a_log(log, tmp_path) -> None:
 STAGE = twin.load_model("proton_xy")
 
 
-@pytest.fixture(scope="module")
-def stage_log() -> Log:
-    model = replace(STAGE, sample_rate=2500.0)
-    return twin.simulate(model, "tracking", seed=1, duration=4.0)
-
-
-def scaled(stage_log: Log, field: str, factor: float) -> Log:
+def scaled(log: Log, field: str, factor: float) -> Log:
     axes = {
         name: replace(a, columns={n: factor * c if n == field else c for n, c in a.columns.items()})
-        for name, a in stage_log.axes.items()
+        for name, a in log.axes.items()
     }
-    return replace(stage_log, axes=axes)
+    return replace(log, axes=axes)
 
 
 @pytest.mark.parametrize(
     ("field", "factor", "said"),
     [("force", -1.0, "one of them is reversed"), ("position", 1e3, "unit")],
 )
-def test_a_reversed_force_or_a_wrong_unit_writes_no_model(stage_log, tmp_path, field, factor, said):
-    wrong = scaled(stage_log, field, factor)
+def test_a_reversed_force_or_a_wrong_unit_writes_no_model(log, tmp_path, field, factor, said):
+    wrong = scaled(log, field, factor)
     write_log(wrong, tmp_path / "wrong.mcap")
     for command in (("fit",), ("add", "cogging")):
         done = cli_runs.twin(
