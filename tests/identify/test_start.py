@@ -87,7 +87,6 @@ def blas_threads() -> set[int]:
 
 @pytest.fixture
 def unsaid(monkeypatch) -> pytest.MonkeyPatch:
-    """An environment that does not say how many threads."""
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
     return monkeypatch
@@ -126,7 +125,7 @@ def test_calls_that_overlap_have_one_thread_for_matrices_and_leave_them() -> Non
         assert blas_threads() == {2}
 
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 ENDINGS = pytest.mark.parametrize(
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
@@ -146,6 +145,7 @@ def wait_until_heeded(pid: int) -> None:
         caught = int(status.read_text().partition("SigCgt:")[2].split()[0], 16)
 
 
+@POSIX
 @ENDINGS
 @pytest.mark.parametrize("seconds", [0.0, 1.0])
 def test_a_signal_is_one_line(
@@ -180,6 +180,7 @@ main()
 """
 
 
+@POSIX
 @ENDINGS
 def test_a_library_that_is_being_loaded_cannot_make_an_error_of_a_signal(
     number: signal.Signals, code: int, word: str, tmp_path: Path

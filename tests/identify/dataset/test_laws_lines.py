@@ -9,12 +9,7 @@ from constructed import SHORT, ridden
 from scipy.signal import lfilter
 
 from identify.dataset.coordinates import lines, ripples
-from identify.dataset.spectrum import (
-    MOST_LINES,
-    Record,
-    find_lines,
-    lines_in_time,
-)
+from identify.dataset.spectrum import MOST_LINES, Record, find_lines, lines_in_time
 
 N = 6000
 

@@ -6,13 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import (
-    CATALOGUE,
-    PLAIN,
-    axis_of,
-    built_dataset,
-    fitted,
-)
+from built_fits import CATALOGUE, PLAIN, axis_of, built_dataset, fitted
 
 from identify.estimation.confounded import linear_bases
 from identify.estimation.evidence import rms

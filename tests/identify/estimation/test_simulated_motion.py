@@ -14,10 +14,7 @@ import identify
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Outcome
-from identify.estimation.open_loop import (
-    measured_beginning,
-    simulated_error,
-)
+from identify.estimation.open_loop import measured_beginning, simulated_error
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion, rough_minimum
 from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
 from twin.effects import load_catalogue

@@ -2,16 +2,7 @@
 
 import numpy as np
 import pytest
-from constructed import (
-    CATALOGUE,
-    COVERED,
-    dataset_of,
-    effect,
-    fit_of,
-    log_of,
-    moved,
-    windowed,
-)
+from constructed import CATALOGUE, COVERED, dataset_of, effect, fit_of, log_of, moved, windowed
 
 from identify.dataset.drive import reading_error
 from identify.dataset.motion import motion_of

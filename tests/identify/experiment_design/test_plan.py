@@ -9,11 +9,7 @@ from machines import one_axis
 
 from identify import diagnose, plan
 from identify.experiment_design.candidate_experiments import proposals
-from identify.experiment_design.discrimination import (
-    Arena,
-    Explanation,
-    contest,
-)
+from identify.experiment_design.discrimination import Arena, Explanation, contest
 from identify.output.as_json import json_of
 from identify.output.report import sections
 from identify.output.report.subject import Subject

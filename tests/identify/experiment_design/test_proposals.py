@@ -23,17 +23,9 @@ from identify.output.words.plan import not_run_in_words
 from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
-from twin.experiments.kinds import (
-    KINDS,
-    Moves,
-    Passes,
-    Rests,
-    Staircase,
-    Steps,
-    Sweep,
-    Tracking,
-)
-from twin.experiments.named import ALLOWED, simulate
+from twin.experiments.kinds import KINDS, Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
+from twin.experiments.lasting import ALLOWED
+from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.numbers import neat

@@ -18,10 +18,7 @@ from identify.estimation.confounded import MovedParameter
 from identify.experiment_design.missing_excitation import Gap
 from identify.output.numbers import Scale, capitalised, number, quantity, span, typeset
 from identify.output.words.addition import axis_in_words, notes_in_words
-from identify.output.words.fit import (
-    aliasing_in_words,
-    moved_in_words,
-)
+from identify.output.words.fit import aliasing_in_words, moved_in_words
 from identify.output.words.plan import gap_in_words
 from identify.results.addition import Addition
 from twin.effects import Catalogue, load_catalogue

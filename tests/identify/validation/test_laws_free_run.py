@@ -13,12 +13,7 @@ from identify.dataset.motion import motion_of
 from identify.estimation.force_balance import residual
 from identify.estimation.open_loop import START_FIT
 from identify.validation.comparison import side_by_side
-from identify.validation.free_run import (
-    HORIZON,
-    FreeRun,
-    free_run,
-    rms_error,
-)
+from identify.validation.free_run import HORIZON, FreeRun, free_run, rms_error
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.simulator import MujocoSimulator, ReducedSimulator
 
