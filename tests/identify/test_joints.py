@@ -247,8 +247,9 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     assert (tmp_path / "arm.xml").read_text() == ARM
     again = fit(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]})
     assert max(again.fits[joint].ratio for joint in JOINTS) < 1.5
-    said = refusal("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
-    assert "the logs prove no body to correct it" in said
+    done = twin("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
+    assert done.returncode == 2
+    assert "the logs prove no body to correct it" in done.stderr
 
 
 @pytest.mark.parametrize(

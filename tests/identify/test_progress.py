@@ -18,12 +18,14 @@ from twin.progress import within
 LINE = re.compile(r"twin: .+ \(\d+ (s|min) so far\)")
 DIAGNOSIS = """
 import json
+from dataclasses import replace
 from identify import workflow
 from identify.cli.progress import progress_on_stderr
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model
 model = load_model("proton_xy", load_catalogue())
+model = replace(model, sample_rate=2500.0)
 logs = {"log": simulate(model, "tracking", seed=1, duration=4.0)}
 known = load_catalogue()
 few = Catalogue([known[name] for name in ("wear", "spring", "cable_slab")])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -196,19 +195,12 @@ def test_five_logs_of_a_million_and_a_half_samples(case: Case, tmp_path: Path) -
     few = Catalogue([catalogue["cogging"]])
     found = workflow.diagnose(case.model, logs, held, test, catalogue=few)
     path = tmp_path / "long.html"
-    begun = time.monotonic()
     case.write(path, diagnosis=found, comparison=found.comparison, additions=())
-    took = time.monotonic() - begun
     with browser(tmp_path) as running:
         paints = []
         for _ in range(5):
             running.open(path)
             paints.append(running.paint())
         assert running.errors == []
-        zoomed = running.run("""const t = performance.now();
-          document.querySelector("[data-zoom=in]").click(); await frame();
-          return performance.now() - t;""")
-    size = path.stat().st_size
-    print(f"{size / 1e6:.2f} MB in {took:.1f} s, paint {min(paints):.2f} s, zoom {zoomed:.0f} ms")
-    assert size < 3_000_000
+    assert path.stat().st_size < 3_000_000
     assert min(paints) < 1.0
