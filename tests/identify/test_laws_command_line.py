@@ -105,6 +105,8 @@ def test_a_command_tells_and_writes_what_its_call_gives(folder, name, monkeypatc
         assert again.axes["x"].names == found.model.axes["x"].names
         assert again.axes["x"].mass == pytest.approx(found.model.axes["x"].mass)
     if name == "plan":
+        assert (found.favoured, found.supposed) == ("quadratic_drag", False)
+        assert found.gap.share is not None
         assert load_experiment(folder / out) == found.chosen.experiment
         assert f"twin simulate {out}" in text
         assert (folder / told["setpoints"]).name == "e.setpoints.csv"
