@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import built_results as made
-from built_fits import CATALOGUE, axis_of, fitted
+from built_fits import CATALOGUE, axis_of, built_fit, fitted
 from report_cases import page_of, subject_of
 
 from identify.estimation.intervals import NotExcited, refusal

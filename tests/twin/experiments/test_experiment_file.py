@@ -19,6 +19,7 @@ from twin.experiments.file import (
 )
 from twin.experiments.kinds import Moves, OpenLoopSine, Passes, Rests, Steps, Sweep
 from twin.experiments.named import simulate
+from twin.logs import read_log
 from twin.model.file import load_model
 from twin.simulator import ReducedSimulator
 
