@@ -146,23 +146,6 @@ def test_regions_have_headings_only_among_axes_with_regions():
         assert [name for name in ("Axis x", "Axis y") if name in text] == expected
 
 
-@pytest.mark.parametrize("kept", [True, False])
-def test_an_addition_comes_first_where_nothing_was_diagnosed(kept):
-    first, *rest = cards(additions=(replace(made.addition(), kept=True), made.addition(kept)))
-    assert len(rest) == 2
-    assert first.headline == "Axis x: cogging added"
-    assert [(t.name, t.value) for t in first.tiles] == [
-        ("Force error, training logs", "7.31 -> 4.57 N"),
-        ("Force error, selection logs", "7.83 -> 4.91 N"),
-        ("Position, free run", "3.71 -> 1.93 µm"),
-    ]  # fmt: skip
-    assert "1.97 µm replayed by MuJoCo" in first.tiles[2].remark
-    assert (first.tone is Tone.STRONG) is kept
-    assert (first.sentence == "The logs prove the effect.") is kept
-    assert ("gain uncertain: t = 1.3, where 1.6 is sure" in first.sentence) is not kept
-    assert len(cards(made.diagnosed(), additions=(made.addition(),))) == 2
-
-
 @pytest.mark.parametrize(
     ("changed", "said"),
     [

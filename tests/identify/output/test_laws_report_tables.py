@@ -12,7 +12,6 @@ from identify.estimation.intervals import NotExcited, refusal
 from identify.output.numbers import number, title_case
 from identify.output.report.effects import given_table, growth_table, values_of
 from identify.output.report.residual import logs
-from identify.output.report.subject import Subject
 from identify.output.words.fit import no_interval_in_words
 
 
@@ -54,28 +53,6 @@ def test_the_ledger_has_the_unit_of_its_largest_error():
     assert table.numeric == [False] + 6 * [True]
     assert growth_table(rising, {}).numeric == [False] + 4 * [True]
     assert logs(subject_of().views[0])[0].numeric == [False] + 5 * [True]
-
-
-def test_the_ledger_of_positions():
-    lost = replace(made.addition(False), step=made.STEPS[1], position_error=(2.9e-6, 2.1e-6))
-    shown = page_of(subject_of(history=made.STEPS[:2], additions=(made.addition(), lost)))
-    assert shown.table("growth", 1) == {
-        "Cogging on x": {
-            "Free run, before": "3.71 µm", "Free run, after": "1.93 µm",
-            "Replayed by MuJoCo": "1.97 µm", "Outcome": "kept",
-        },
-        "Lugre on x": {
-            "Free run, before": "2.90 µm", "Free run, after": "2.10 µm",
-            "Replayed by MuJoCo": "1.97 µm", "Outcome": "not supported",
-        },
-    }  # fmt: skip
-    assert "growth" not in page_of(subject_of(history=())).sections
-    assert subject_of(history=(), additions=(made.addition(),)).steps == (made.STEPS[0],)
-    one = Subject("t", None, made.Comparison(made.MODEL, {"x": made.comparison_of()}),
-                  made.STEPS[:2], ())  # fmt: skip
-    assert "Axis x" not in page_of(one).texts["growth"]
-    both = replace(one, history=made.STEPS)
-    assert "Axis y" in page_of(both).texts["growth"]
 
 
 def test_errors_log_by_log():
