@@ -55,9 +55,9 @@ class CSource:
     @property
     def kept(self) -> dict[str, tuple[str, ...]]:
         """By axis, what is kept as it is."""
-        nearly, kept = {(r.axis, r.part) for r in self.approximated}, {}
+        less, kept = {(r.axis, r.part) for r in (*self.approximated, *self.lost)}, {}
         for a in self.axes:
-            effects = (n for n in a.axis.names if (a.name, n) not in nearly)
+            effects = (n for n in a.axis.names if (a.name, n) not in less)
             kept[a.name] = (a.axis.units.mass_name, *effects)
         return kept
 

@@ -84,7 +84,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
         own = mapping.of_file(number)
         with reading(path):
             table, columns, of_file, scalars = _read(path, own)
-            own, mapping = own.scaled_by(scalars), mapping.scaled_by(scalars)
+            own, mapping = own.scaled_by(scalars), mapping.scaled_by(scalars, number)
             times = _times(table, own, columns) + files[number - 1].offset
             clocks.append((own, columns, clock_of(times, rate)))
         facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}

@@ -213,11 +213,17 @@ class ImportMap(_File):
         """The scalars of a file that scales name."""
         return tuple(dict.fromkeys(c.scale for c in self.columns() if isinstance(c.scale, str)))
 
-    def scaled_by(self, scalars: Mapping[str, float]) -> ImportMap:
-        """The same with these scalars, none of which is called as a number, in their scales."""
-        return self._changed(
-            lambda c: c.model_copy(update={"scale": scalars.get(str(c.scale), c.scale)})
-        )
+    def scaled_by(self, scalars: Mapping[str, float], file: int | None = None) -> ImportMap:
+        """The same with these scalars, none of which is called as a number, in their scales.
+
+        file: of several, the one whose they are.
+        """
+
+        def change(c: ColumnMap) -> ColumnMap:
+            scale = scalars.get(str(c.scale), c.scale) if file in (None, c.file) else c.scale
+            return c.model_copy(update={"scale": scale})
+
+        return self._changed(change)
 
     def _changed(self, change: Callable[[ColumnMap], ColumnMap | None], **other: Any) -> ImportMap:
         """The same with other columns, and other entries."""

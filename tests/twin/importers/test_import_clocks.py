@@ -185,3 +185,14 @@ def test_as_many_files_as_tables(tmp_path):
         import_log(paths[:1], mapping(tmp_path, TWO))
     with pytest.raises(InputError, match=r"several need a table \[\[files\]\]"):
         import_log(paths, mapping(tmp_path, PLAIN))
+
+
+def test_a_scale_is_the_scalar_of_its_own_file(tmp_path):
+    """Both files call theirs k: 2 and 5."""
+    for name, k in (("a", 2.0), ("b", 5.0)):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"q": list(range(9)), "k": [k]}))
+    rates = 2 * "[[files]]\nsample_rate = 500.0\n"
+    text = TWO[TWO.index("[axes.x]") :].replace('column = "q"', 'column = "q", scale = "k"')
+    log = import_log([tmp_path / "a.json", tmp_path / "b.json"], mapping(tmp_path, rates + text))
+    np.testing.assert_allclose(log.axes["x"].position, 2e-3 * np.arange(9.0))
+    np.testing.assert_allclose(log.axes["x"].force, 5.0 * np.arange(9.0))
