@@ -6,6 +6,7 @@ from check_drive import axis_of, drive, findings, motion, stated
 
 from twin.checks import Fault, Severity, check_log
 from twin.checks.axis import held_samples
+from twin.checks.command import off_course
 from twin.checks.explain import find_trend
 from twin.logs import AxisLog, Log
 
@@ -161,6 +162,13 @@ def test_a_held_signal_is_told_with_the_rate_it_was_sampled_at(name):
     assert found.what.startswith(f"the {name} changes at every 4th sample only")
     assert found.what.endswith("it was sampled at 250 Hz and held")
     assert found.remedy == "record it at 1000 Hz, or the log at 250 Hz"
+
+
+def test_a_sample_is_off_the_median_of_five():
+    signal = np.random.default_rng(8).standard_normal(200)
+    wanted = [abs(signal[k] - np.median(signal[k - 2 : k + 3])) for k in range(2, 198)]
+    np.testing.assert_allclose(off_course(signal), [0.0, 0.0, *wanted, 0.0, 0.0])
+    assert not off_course(signal[:5]).any()
 
 
 @pytest.mark.parametrize(("parts", "enough"), [(4, False), (5, True)])
