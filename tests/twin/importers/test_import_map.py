@@ -23,6 +23,17 @@ def load(folder: Path, text: str) -> ImportMap:
     return load_mapping(path)
 
 
+def test_the_map_keeps_its_text_and_names_its_columns_once(tmp_path: Path) -> None:
+    text = GOOD + '[axes.y]\nposition = {column = "q", unit = "m"}\n'
+    text += 'current = {column = 3, unit = "mA"}\nforce_constant = 53.4\n'
+    mapping = load(tmp_path, text)
+    assert mapping.text == text
+    assert mapping.column_names() == ("q", "u", "3")
+    assert mapping.sample_rate == 1000.0
+    assert mapping.axes["y"].force_constant == 53.4
+    assert mapping.axes["x"].units["force"] == "N"
+
+
 @pytest.mark.parametrize(
     ("unit", "si", "answer"),
     [

@@ -61,6 +61,13 @@ def test_every_bound_of_the_catalogue_is_kept_on_both_sides():
                 assert str(told.value).startswith(f"{name}.{p.name} = ")
 
 
+@pytest.mark.parametrize("mass", [-5e-324, math.inf])
+def test_a_mass_is_finite_and_not_below_zero(mass):
+    with pytest.raises(InputError, match="must be a positive number of kg"):
+        AxisModel(mass)
+    assert AxisModel(5e-324).mass > 0.0
+
+
 def test_a_friction_takes_the_place_of_the_friction_that_was_there_and_of_nothing_else():
     swapped = axis().with_effect(Fitted.at_start(OTHER))
     assert swapped.names == ("pair", "spring", "glide")
