@@ -24,8 +24,8 @@ from twin.experiments.kinds import (
     Sweep,
     Tracking,
 )
-from twin.experiments.named import EXPERIMENTS, find_experiment
-from twin.experiments.trajectory import Setpoint
+from twin.experiments.named import EXPERIMENTS, MAP_SPEEDS, find_experiment
+from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.model.machine import AxisModel, Hardware, MachineModel
 
 RATE = 2000.0
@@ -308,3 +308,14 @@ def test_a_named_experiment_moves_its_axis_alone(name: str, axis: str) -> None:
     if name not in ("tracking", "moves"):
         busy = np.ptp(found.position, axis=0) + np.ptp(found.force, axis=0)
         assert busy["xy".index(axis)] > 0.0 == busy[1 - "xy".index(axis)]
+
+
+def test_a_map_runs_the_speeds_that_the_axis_reaches() -> None:
+    staircase = find_experiment("velocity_map", STAGE, "x", 10.0)
+    fastest = LIMITS[0].fastest_plateau(staircase.span)
+    assert staircase.speeds == tuple(s for s in MAP_SPEEDS if s <= fastest)
+    assert find_experiment("velocity_map", STAGE).axis == "x"
+    passes = find_experiment("cable_pass", STAGE, "y", 60.0)
+    assert passes.span == pytest.approx(0.88 * 0.14)
+    assert passes.speed == 0.1
+    assert 2 * passes.repeats * passes.span / 0.1 <= 60.0 < 2 * (passes.repeats + 1) * 0.14 / 0.1
