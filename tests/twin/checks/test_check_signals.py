@@ -131,6 +131,19 @@ def motion_and_force(noise: float, mass: float = 3.5):
     return regressors, clean + noise * np.std(clean) * white
 
 
+def test_gains_are_those_put_in_whatever_a_few_samples_say():
+    regressors, force = motion_and_force(0.0)
+    force[700:720] += 500.0  # one in a hundred, trimmed
+    force[100:130] = np.nan_to_num(np.inf)
+    kept = np.ones(2000)
+    kept[100:130] = 0.0
+    fit = fit_dynamics(force, regressors, kept, 11)
+    assert (fit.mass, fit.first) == (pytest.approx(3.5, rel=1e-9), 11)
+    np.testing.assert_allclose(fit.residual[700:720], 500.0, rtol=1e-6)
+    assert fit_dynamics(-force, regressors, kept, 0).mass == pytest.approx(-3.5, rel=1e-9)
+    assert fit_dynamics(force[:90], 0.0 * regressors[:90], kept[:90], 0).mass == 0.0
+
+
 @pytest.mark.parametrize(
     ("noise", "mass", "explains", "matters"),
     [(0.2, 3.5, True, True), (0.6, 3.5, False, True), (0.0, 0.05, True, False),
