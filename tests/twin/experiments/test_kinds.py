@@ -25,7 +25,7 @@ from twin.experiments.kinds import (
     Tracking,
 )
 from twin.experiments.named import EXPERIMENTS, MAP_SPEEDS, find_experiment
-from twin.experiments.trajectory import AnySetpoint, Setpoint
+from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Hardware, MachineModel
 
 RATE = 2000.0
