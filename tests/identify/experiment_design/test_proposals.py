@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from built_fits import HARDWARE, PLAIN
 from machines import one_axis
-from twin.experiments.lasting import ALLOWED
 
 from identify import plan
 from identify.experiment_design.candidate_experiments import proposals
@@ -25,7 +24,7 @@ from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
-from twin.experiments.named import simulate
+from twin.experiments.named import ALLOWED, simulate
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.numbers import neat
