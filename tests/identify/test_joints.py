@@ -274,7 +274,8 @@ def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(
         assert told.body.untold == ("mass", "first moment y")
         assert told.body.told["first moment x"][0] == pytest.approx(0.12, rel=0.01)
     if motor:
-        offered = told.offered(load_catalogue(), motor)
+        known = Catalogue([*FEW.values(), load_catalogue()["torque_constant"]])
+        offered = told.offered(known, motor)
         one = diagnose_axis(found.fits[motor], found.datasets[motor], offered)
         assert one.named == ("torque_constant",)
         assert one.findings[0].parameters["error"] == pytest.approx(1.0 / gain - 1.0, abs=0.01)
