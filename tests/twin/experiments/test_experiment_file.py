@@ -1,4 +1,4 @@
-"""Experiment files, setpoints as CSV, and the command that plans one and simulates it."""
+"""Experiment files, setpoints as CSV, and what the commands refuse of them."""
 
 from dataclasses import fields
 from pathlib import Path
