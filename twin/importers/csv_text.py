@@ -196,12 +196,15 @@ def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) ->
     """Names of the columns: the topmost of the rows above the numbers that are as wide."""
     width = len(rows[skip])
     widths = (width, width - 1) if not rows[skip][-1] else (width,)  # rows may end in a delimiter
-    top = skip if header_line is None else header_line - 1
-    while header_line is None and top > 0 and len(rows[top - 1]) in widths:
-        top -= 1
-    if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
-        return tuple(str(k + 1) for k in range(width))
-    top = min(top, skip - 1)
+    if header_line is not None:
+        top = header_line - 1
+    else:
+        top = skip
+        while top > 0 and len(rows[top - 1]) in widths:
+            top -= 1
+        if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
+            return tuple(str(k + 1) for k in range(width))
+        top = min(top, skip - 1)
     if len(rows[top]) not in widths:
         raise InputError(
             f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
@@ -214,8 +217,10 @@ def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputErro
     """The first cell that is not a number."""
     with open(path, encoding=layout.encoding, errors="replace") as stream:
         for number, line in itertools.islice(enumerate(stream, 1), layout.skip, None):
+            if not line.strip():
+                continue
             cells = layout.style.cells(line)
-            for index in where if line.strip() else ():
+            for index in where:
                 place = f"line {number}, column '{layout.names[index]}'"
                 if index >= len(cells) or not cells[index]:
                     return InputError(f"{place}: is empty; complete or cut out the row")
