@@ -23,6 +23,7 @@ from identify.experiment_design.discrimination import (
     require_within_limits,
 )
 from identify.experiment_design.missing_excitation import UNITS, gap, most_missed, properties
+from identify.experiment_design.plan import _planned
 from twin.errors import CannotRun
 from twin.experiments.kinds import Passes, Rests, Tracking
 from twin.logs import AxisLog, Log
@@ -181,6 +182,18 @@ def test_trials_come_by_falling_gain_and_a_refit_judges_by_the_truth_told_worst(
 
 
 LOG = windowed(SHORT)
+
+
+def test_a_plan_leaves_out_logs_that_refute_a_rival():
+    """They would decide whatever the experiment is; a refit of the new log takes the mass over."""
+    rivals = Explanation("good", PLAIN), Explanation("bad", replace(PLAIN, mass=6.0))
+    found, without = (
+        _planned(arena(*rivals, logs=logs), 3.0, 2, False, {}) for logs in ((OLD,), ())
+    )
+    gains = [t.gain for t in found.ranking]
+    assert gains == pytest.approx([t.gain for t in without.ranking])
+    assert max(gains) < 1.0
+    assert (found.favoured, without.favoured) == ("good", None)
 
 
 def test_properties_are_windowed_means_of_the_motion():
