@@ -8,7 +8,7 @@ from constructed import effect, fit_of, held, log_of, moved, waves, windowed
 
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import moving
-from identify.estimation.fit import Fit, Outcome, error_on, finished, fit_axis, rms
+from identify.estimation.fit import Fit, Outcome, at_bounds, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise
 from identify.rules import RULE
@@ -126,7 +126,12 @@ def test_a_strength_that_is_truly_zero_is_not_at_its_bound():
 def test_a_bound_that_the_model_tightens_is_told_on_either_side():
     log = windowed(motion_of(log_of(RATE, *pushed_by(0.5)), "x", "log"))
     pull = effect("constant_force")
-    for low, high, told in ((-1.0, 0.2, True), (-1.0, 0.6, False), (-2.0, -1.0, True)):
+    for low, high, told in (
+        (-1.0, 0.2, True),
+        (-1.0, 0.6, False),
+        (-2.0, -1.0, True),
+        (-1.0, 0.0, True),
+    ):
         p = replace(pull.effect.parameters[0], lower=low, upper=high, start=high, strength=False)
         bounded = replace(pull.effect, parameters=(p,))
         found = fit_axis(
@@ -134,6 +139,8 @@ def test_a_bound_that_the_model_tightens_is_told_on_either_side():
         )
         assert found.at_bound == (("constant_force.F0",) if told else ()), (low, high)
         assert (found.ended is Outcome.AT_BOUND) == told
+        assert at_bounds(found, "constant_force") == (found.at_bound if high else ())  # absent
+        assert at_bounds(found, "another") == ()
 
 
 def pushed_by(constant: float) -> tuple[np.ndarray, np.ndarray]:
