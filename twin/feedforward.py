@@ -38,6 +38,10 @@ class Followed:
     late: float
     """By how much the drive's force is late, s: the setpoint has to be given as much earlier."""
 
+    def ahead(self, period: float) -> float:
+        """By how much the setpoint has to come early, s: a command is held over a period (s)."""
+        return 0.5 * period + self.late
+
 
 def followed(axis: AxisModel) -> Followed:
     """What a feedforward keeps of an axis."""

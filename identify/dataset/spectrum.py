@@ -180,7 +180,7 @@ def find_lines(
 
 
 def strongest_line(
-    record: Record, lowest: float, highest: float, least: float = 0.0
+    record: Record, lowest: float, highest: float, least: float
 ) -> tuple[float, float]:
     """Frequency from ``lowest`` to ``highest`` of the strongest sine, and its share of variance.
 

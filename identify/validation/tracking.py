@@ -176,10 +176,10 @@ def _force(model: MachineModel, motion: Setpoint) -> Array:
     time = period * np.arange(len(motion))
     forces = []
     for i, axis in enumerate(model.axes.values()):
-        late = followed(axis).late
+        due = time + followed(axis).ahead(period)
         columns = motion.position, motion.velocity, motion.acceleration
         ahead = [
-            [np.interp(time + 0.5 * period + late, time, c[:, j]) for c in columns]
+            [np.interp(due, time, c[:, j]) for c in columns]
             for j in (i, 1 - i if len(model.axes) == 2 else i)
         ]
         own, other = map(np.array, ahead)

@@ -256,7 +256,7 @@ class Reach:
 
     def __init__(self, model: MachineModel) -> None:
         self._model = model
-        self._farthest: dict[str, tuple[float, float, float]] = {}  # and the ends of the travel
+        self._farthest: dict[str, float] = {}
 
     def take(self, log: Log) -> Log:
         """Look at the next part, which is returned."""
@@ -264,17 +264,17 @@ class Reach:
             if axis.hardware.travel is None:
                 continue
             low, high = axis.hardware.travel
-            before = self._farthest.get(name, (low,))[0]
-            position = np.append(log.truth[name]["position"], before)
+            position = np.append(log.truth[name]["position"], self._farthest.get(name, low))
             out = np.maximum(low - position, position - high)
-            self._farthest[name] = float(position[np.argmax(out)]), low, high
+            self._farthest[name] = float(position[np.argmax(out)])
         return log
 
     def warnings(self) -> tuple[str, ...]:
         """A sentence for each axis that left its travel."""
         said = []
-        for name, (farthest, low, high) in self._farthest.items():
+        for name, farthest in self._farthest.items():
             units, hardware = self._model.axes[name].units, self._model.axes[name].hardware
+            low, high = hardware.travel or (-math.inf, math.inf)
             if not low <= farthest <= high:
                 said.append(
                     f"axis {name} went to {farthest:.6g} {units.position}, outside its travel of "

@@ -38,7 +38,7 @@ class AxisCode:
     arguments: tuple[str, ...]
     """Of the function, after the state."""
     ahead: float
-    """s by which the setpoint has to come early: half a period of a held command, and the drive."""
+    """By how much the setpoint has to come early, s."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ def c_source(model: MachineModel) -> CSource:
         prefix = f"{name}_{names[axis_name]}"
         other = any(f.effect.reads_other_axis for f, _ in made)
         more = tuple(f"other_{m}" for m in MOTION) if other else ()
-        ahead = 0.5 * model.period + found.late
-        axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), (*MOTION, *more), ahead))
+        arguments, ahead = (*MOTION, *more), found.ahead(model.period)
+        axes.append(AxisCode(axis_name, prefix, found.axis, tuple(made), arguments, ahead))
     header = _header(model, name, axes, approximated, lost)
     source = _source(model, name, axes, laws)
     return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))

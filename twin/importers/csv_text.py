@@ -60,8 +60,10 @@ class _Style:
     def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
         """Of the cells of ``lines``; 0 where there are fewer columns."""
         rows = [self.cells(line) for line in lines]
-        cells = list(itertools.chain.from_iterable(rows)) if len(rows[-1]) >= columns else []
-        return sum(map(self.is_number, cells)) / max(len(cells), 1)
+        if len(rows[-1]) < columns:
+            return 0.0
+        cells = list(itertools.chain.from_iterable(rows))
+        return sum(map(self.is_number, cells)) / len(cells)
 
 
 @dataclass(frozen=True)

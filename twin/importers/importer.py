@@ -58,7 +58,7 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
         )
     with reading(paths[0]):
         table, columns, facts, scalars = _read(paths[0], mapping)
-        mapping = mapping.scaled_by(scalars)
+        mapping = mapping.scaled_by(scalars, 1)
         facts |= _start(table, mapping, columns)
         if mapping.resample is None or mapping.time is None:
             return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
@@ -84,7 +84,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
         own = mapping.of_file(number)
         with reading(path):
             table, columns, of_file, scalars = _read(path, own)
-            own, mapping = own.scaled_by(scalars), mapping.scaled_by(scalars, number)
+            own, mapping = (m.scaled_by(scalars, number) for m in (own, mapping))
             times = _times(table, own, columns) + files[number - 1].offset
             clocks.append((own, columns, clock_of(times, rate)))
         facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
@@ -189,7 +189,7 @@ def _start(table: Table, mapping: ImportMap, columns: Columns) -> dict[str, str]
     start = table.start_ns
     if start is None and mapping.time is not None:
         raw = np.asarray(table.columns[mapping.time.name])
-        first = mapping.time.to_si(columns[mapping.time.name])[0]
+        (first,) = mapping.time.to_si(columns[mapping.time.name][:1])
         if raw.dtype.kind == "M":
             start = int(raw[0].astype("datetime64[ns]").astype(np.int64))
         elif is_calendar(first):

@@ -213,15 +213,13 @@ class ImportMap(_File):
         """The scalars of a file that scales name."""
         return tuple(dict.fromkeys(c.scale for c in self.columns() if isinstance(c.scale, str)))
 
-    def scaled_by(self, scalars: Mapping[str, float], file: int | None = None) -> ImportMap:
-        """The same with these scalars, none of which is called as a number, in their scales.
-
-        file: of several, the one whose they are.
-        """
+    def scaled_by(self, scalars: Mapping[str, float], file: int) -> ImportMap:
+        """The same with the scalars of a file in the scales of its columns that name them."""
 
         def change(c: ColumnMap) -> ColumnMap:
-            scale = scalars.get(str(c.scale), c.scale) if file in (None, c.file) else c.scale
-            return c.model_copy(update={"scale": scale})
+            if c.file != file or not isinstance(c.scale, str):
+                return c
+            return c.model_copy(update={"scale": scalars[c.scale]})
 
         return self._changed(change)
 
