@@ -245,11 +245,11 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     old = '<inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>'
     assert (tmp_path / "corrected.xml").read_text() == ARM.replace(old, element)
     assert (tmp_path / "arm.xml").read_text() == ARM
-    again = fit(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]})
-    assert max(again.fits[joint].ratio for joint in JOINTS) < 1.5
-    done = twin("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
-    assert done.returncode == 2
-    assert "the logs prove no body to correct it" in done.stderr
+    again = diagnose(tmp_path / "corrected.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
+    assert again.body is None
+    assert not any(d.findings for d in again.axes.values())
+    said = refusal("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
+    assert "the logs prove no body to correct it" in said
 
 
 @pytest.mark.parametrize(
