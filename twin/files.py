@@ -6,7 +6,7 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -76,8 +76,7 @@ def is_same_file(one: Path, other: Path) -> bool:
 def remove_unfinished() -> None:
     """Remove what is half written, where the program ends at once."""
     for part in tuple(_unfinished):
-        with suppress(OSError):
-            part.unlink()
+        _remove(part)
 
 
 @contextmanager
@@ -116,20 +115,31 @@ def _opened(target: Path, name: str) -> Iterator[BinaryIO]:
     name: with {} for that of the target.
     """
     part = target.with_name(name.format(target.name))
-    with open(part, "ab") as stream:
+    with ExitStack() as leaving:
+        if not part.exists():  # else it may be another run's, until it is locked
+            _note(part, leaving)
+        stream = leaving.enter_context(open(part, "ab"))
         try:
             _lock(stream)
         except BlockingIOError as error:
             raise InputError(f"{part}: another run is writing it; give another name") from error
-        _unfinished.add(part)
-        try:
-            if stream.tell():  # a killed run has left it
-                stream.truncate(0)
-            yield stream
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
-            _unfinished.discard(part)
+        _note(part, leaving)
+        if stream.tell():  # a killed run has left it
+            stream.truncate(0)
+        yield stream
+
+
+def _note(part: Path, leaving: ExitStack) -> None:
+    """Note that a file is half written; it is removed on leaving if it is still there."""
+    _unfinished.add(part)
+    leaving.callback(_remove, part)
+
+
+def _remove(part: Path) -> None:
+    if part in _unfinished:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        _unfinished.discard(part)
 
 
 def _checked(path: Path) -> Path:
