@@ -35,6 +35,28 @@ class Remark:
 
 
 @dataclass(frozen=True)
+class Loss:
+    """What a format loses of an effect. size, left: RMS of its force and of what is lost of it."""
+
+    size: float
+    left: float
+
+    @property
+    def is_negligible(self) -> bool:
+        """Whether less is lost than a tenth of usual intervals."""
+        return self.left <= 0.01 * self.size
+
+    @property
+    def is_most(self) -> bool:
+        """Whether more is lost than held, so that the effect is called lost."""
+        return self.left > 0.5 * self.size
+
+    def on(self, where: str, unit: str) -> str:
+        """In words; where: the motion along which it was computed."""
+        return f"{self.left:.2g} of its {self.size:.2g} {unit} RMS are lost on {where}"
+
+
+@dataclass(frozen=True)
 class Exported:
     """The files of an export, and what they lack of the model."""
 

@@ -17,7 +17,7 @@ from twin.errors import InputError
 from twin.experiments.follow import recorded_setpoint
 from twin.experiments.named import find_experiment
 from twin.experiments.trajectory import AnySetpoint
-from twin.export import Exported, Remark
+from twin.export import Exported, Loss, Remark
 from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -28,8 +28,6 @@ SPEEDS = 61  # from zero on, denser at low speed, where friction bends
 ENTRIES = 256  # of one period
 FEW = 33  # places that tell the mean over the travel at each speed
 RUN_IN = 0.25  # of the travel, run on the spot for friction to forget how it began
-KEPT = 0.01  # least part of an effect's force that is told to be lost: a tenth of usual intervals
-HALF = 0.5  # where more is lost than held, the effect is called lost
 EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses where no log is given
 
 
@@ -249,13 +247,13 @@ def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> 
         if effect in found.axis.names:
             less = axis.without(effect)
             own, in_tables = total - both(less, tabled(less))
-            size, left = (float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables))
-            if left <= KEPT * size and size:
+            loss = Loss(*(float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables)))
+            if loss.is_negligible and loss.size:
                 kept.append(effect)
                 continue
-            lost = 0.0 < HALF * size < left
-            text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {where}"
-            if not size:
+            lost = loss.is_most and loss.size > 0.0
+            text = loss.on(where, unit)
+            if not loss.size:
                 text = f"it makes no {units.words('force')} on {where}, so its loss is not known"
         else:
             text = (found.lost if lost else found.approximated)[effect]

@@ -17,7 +17,7 @@ import numpy as np
 from twin.core.walks import walk
 from twin.effect import Kind
 from twin.errors import InputError
-from twin.export import Exported, Exporter, Remark
+from twin.export import Exported, Exporter, Loss, Remark
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.mujoco.mechanism import PASSIVE
@@ -25,8 +25,6 @@ from twin.mujoco.mjcf import read_spec
 from twin.mujoco.written import in_mjcf, with_joint
 from twin.signals import Array, between
 
-KEPT = 0.01  # least part of an effect's force that is told to be lost
-HALF = 0.5  # where more is lost than held, the effect is called lost
 UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
 SWING, SAMPLE = 10.0, 1e-3  # s, of the sine over the travel on which losses are told without a log
 
@@ -92,21 +90,20 @@ def _judged(
         if f.effect.kind is Kind.STRUCTURE and held:  # an inertia, which is what it is
             kept.append(f.effect.name)
             continue
-        size, left = _sizes(alone, held, motions)
-        if held and left <= KEPT * size:
+        loss = _loss(alone, held, motions)
+        if held and loss.is_negligible:
             kept.append(f.effect.name)
-        elif size == 0.0:
-            lost.append(Remark(axis, f.effect.name, UNKNOWN))
         else:
-            text = f"{left:.2g} of its {size:.2g} {unit} RMS are lost on {on}"
-            (lost if left > HALF * size else nearly).append(Remark(axis, f.effect.name, text))
+            text = loss.on(on, unit) if loss.size else UNKNOWN
+            none = loss.is_most or not loss.size
+            (lost if none else nearly).append(Remark(axis, f.effect.name, text))
     return tuple(kept), nearly, lost
 
 
-def _sizes(
+def _loss(
     alone: AxisModel, held: Mapping[str, float], motions: list[tuple[Array, float]]
-) -> tuple[float, float]:
-    """N RMS of one effect while the axis moves, and of what the attributes lose of it."""
+) -> Loss:
+    """What the attributes lose of one effect while the axis moves."""
     whole, left = [], []
     for motion, period in motions:
         table = axis_table({"": alone})
@@ -123,8 +120,7 @@ def _sizes(
         whole.append(made[v != 0.0])
         left.append((made - force)[v != 0.0])
     sizes = (np.concatenate(parts) for parts in (whole, left))
-    size, loss = (float(np.sqrt(np.mean(s**2))) if len(s) else 0.0 for s in sizes)
-    return size, loss
+    return Loss(*(float(np.sqrt(np.mean(s**2))) if len(s) else 0.0 for s in sizes))
 
 
 def _motion(position: Array, period: float) -> tuple[Array, float]:
