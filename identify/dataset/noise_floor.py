@@ -219,7 +219,8 @@ def _uneven(log: PreparedLog) -> tuple[Array, Array]:
     readings, step = log.motion.readings, log.motion.resolution
     width = (min(len(log.fine.weights), WIDEST) - 1) | 1
     path = local_parabola(readings, width)
-    square = np.convolve(((readings - path) / step) ** 2, np.ones(width) / width, "same")
+    sums = np.cumsum(np.pad(((readings - path) / step) ** 2, (width // 2 + 1, width // 2)))
+    square = (sums[width:] - sums[:-width]) / width
     return np.maximum(square[1:] - 1.0 / 12.0, 0.0), np.abs(np.diff(path)) / step
 
 
@@ -237,10 +238,12 @@ def _tones(log: PreparedLog, white: float, frequency: Array, gain: Array) -> Arr
     strayed, steps = _uneven(log)
     above = np.zeros(len(steps))
     for k in range(1, HARMONICS + 1):
-        fast = k * steps > 0.5  # slower ones are told
-        part = 6.0 / (np.pi * k) ** 2 * _kept(k, strayed) * fast
-        left = np.flatnonzero(part > RULE.line_chance)  # noise leaves few, and these take the time
+        share = 6.0 / (np.pi * k) ** 2
+        # Noise leaves few of which enough is kept, and these take the time; slower ones are told.
+        most = np.log(share / RULE.line_chance) / (2.0 * np.pi * k) ** 2
+        left = np.flatnonzero((k * steps > 0.5) & (strayed < most))
         turns = k * steps[left]
         tone = np.interp(np.abs(turns - np.rint(turns)) / log.motion.sample_period, frequency, gain)
-        above[left] += part[left] * (log.motion.resolution**2 / 12.0 * tone - white)
+        part = share * _kept(k, strayed[left])
+        above[left] += part * (log.motion.resolution**2 / 12.0 * tone - white)
     return above
