@@ -6,6 +6,7 @@ import numpy as np
 
 from twin.effect import Excitation, Kind
 from twin.effects import load_catalogue
+from twin.excitation import Repeating
 from twin.laws.trials import moderate
 from twin.model.machine import Fitted, MachineModel
 
@@ -13,8 +14,8 @@ CATALOGUE = load_catalogue()
 FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is Kind.FRICTION)
 LOG = Excitation(
     position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,
-    period=2.5e-4, force_max=11.0, lines=(53.0, 17.0), ripples=(3.1e-5, 1.7e-5), resolution=2.3e-7,
-    other_joints=(1.0, 2.0),
+    period=2.5e-4, force_max=11.0, repeats=Repeating((53.0, 17.0)), ripples=(3.1e-5, 1.7e-5),
+    resolution=2.3e-7, other_joints=(1.0, 2.0),
 )  # fmt: skip
 
 

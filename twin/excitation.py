@@ -3,6 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
+
+
+class Repeats(Protocol):
+    """What of a force repeats, see ``Excitation``; it may be looked for when it is asked for."""
+
+    @property
+    def lines(self) -> tuple[float, ...]: ...
+    @property
+    def pitches(self) -> tuple[float, ...]: ...
+    @property
+    def thrust_pitches(self) -> tuple[float, ...]: ...
+
+
+@dataclass(frozen=True)
+class Repeating:
+    """What of a force is known to repeat."""
+
+    lines: tuple[float, ...] = ()
+    pitches: tuple[float, ...] = ()
+    thrust_pitches: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -23,20 +44,30 @@ class Excitation:
     """Sample period, s."""
     force_max: float = 1.0
     """Largest command, N."""
-    lines: tuple[float, ...] = ()
-    """Frequencies at which the force repeats in time, Hz; strongest first."""
+    repeats: Repeats = Repeating()
+    """What of the force repeats."""
     ripples: tuple[float, ...] = ()
     """Periods at which the reading's error may repeat in position, m; strongest first."""
     resolution: float = 0.0
     """Step of the readings, m; 0 where none shows."""
-    pitches: tuple[float, ...] = ()
-    """Periods at which what a model leaves of the force repeats along the track, m; strongest
-    first, none without a model."""
-    thrust_pitches: tuple[float, ...] = ()
-    """The same of the motor's force in proportion to it, m."""
-
     other_joints: tuple[float, ...] = ()
     """Numbers of a mechanism's other joints, in the order of its axes; none of a plain axis."""
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        """Frequencies at which the force repeats in time, Hz; strongest first."""
+        return self.repeats.lines
+
+    @property
+    def pitches(self) -> tuple[float, ...]:
+        """Periods at which what a model leaves of the force repeats along the track, m; strongest
+        first, none without a model."""
+        return self.repeats.pitches
+
+    @property
+    def thrust_pitches(self) -> tuple[float, ...]:
+        """The same of the motor's force in proportion to it, m."""
+        return self.repeats.thrust_pitches
 
     @property
     def travel(self) -> float:

@@ -12,6 +12,7 @@ from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.readings import FEWEST_CYCLES
 from identify.dataset.spectrum import Record, find_lines, lines_in_time
 from twin.effect import Excitation
+from twin.excitation import Repeating
 from twin.signals import Array
 
 QUANTITIES = ("position", "velocity", "acceleration")
@@ -87,7 +88,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
         duration=float(sum(len(m.time) * m.period for m in motions)),
         period=motions[0].period,
         force_max=force,
-        lines=lines(heard),
+        repeats=Repeating(lines(heard)),
         ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
         resolution=max(m.resolution for m in motions),
         other_joints=_other_joints(motions[0]),

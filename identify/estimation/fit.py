@@ -126,14 +126,19 @@ class Fit:
         return lines_in_time(list(zip(self.by_log, steps, strict=True)), LINES)
 
     @cached_property
-    def pitches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Periods (m) at which the residual repeats along the track, and the same times command."""
+    def pitches(self) -> tuple[float, ...]:
+        """Periods (m) at which the residual repeats along the track."""
+        return self._repeating(np.ones(len(self.residual)))
+
+    @cached_property
+    def thrust_pitches(self) -> tuple[float, ...]:
+        """The same of the residual over the command."""
+        return self._repeating(np.concatenate([log.command for log in self.logs])[self.kept])
+
+    def _repeating(self, weight: Array) -> tuple[float, ...]:
         position = [log.test_function.mean(log.motion.position) for log in self.logs]
-        command = [log.command for log in self.logs]
-        place, thrust = (np.concatenate(parts)[self.kept] for parts in (position, command))
-        weights = np.ones(len(place)), thrust
-        plain, driven = (spatial_periods(place, self.residual, w, self.jacobian) for w in weights)
-        return plain, driven
+        place = np.concatenate(position)[self.kept]
+        return spatial_periods(place, self.residual, weight, self.jacobian)
 
     @cached_property
     def at_bound(self) -> tuple[str, ...]:

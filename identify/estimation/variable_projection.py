@@ -140,8 +140,28 @@ def _unlike(found: Sequence[Start]) -> list[Start]:
 
 def with_what_repeats(base: Fit, dataset: Dataset) -> Excitation:
     """What the motion covers, with what repeats in the base's residual, and first."""
-    known, (pitches, thrust) = dataset.excitation, base.pitches
-    return replace(known, lines=(*base.lines, *known.lines), pitches=pitches, thrust_pitches=thrust)
+    known = dataset.excitation
+    return replace(known, repeats=_Beside(base, known.lines))
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What repeats beside a base, which few effects ask for. known: Hz, lines of the force."""
+
+    base: Fit
+    known: tuple[float, ...]
+
+    @property
+    def lines(self) -> tuple[float, ...]:
+        return (*self.base.lines, *self.known)
+
+    @property
+    def pitches(self) -> tuple[float, ...]:
+        return self.base.pitches
+
+    @property
+    def thrust_pitches(self) -> tuple[float, ...]:
+        return self.base.thrust_pitches
 
 
 def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:

@@ -30,6 +30,7 @@ from identify.estimation.variable_projection import (
     with_what_repeats,
 )
 from twin.effect import Excitation
+from twin.excitation import Repeating
 from twin.model.parameters import ParameterReference
 
 # The rules as they were decided.
@@ -85,14 +86,13 @@ def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
     base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
     tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.fit])
     loud = replace(base, residual=tone[base.kept])
-    known = replace(dataset, covered=lambda: replace(SEEN, lines=(3.21, 4.56)))
+    known = replace(dataset, covered=lambda: replace(SEEN, repeats=Repeating((3.21, 4.56))))
     found = with_what_repeats(loud, known)
     assert found.lines[-2:] == (3.21, 4.56)
     assert abs(found.lines[0] - 7.3) < 0.5
     assert len(found.lines) <= RESIDUAL_LINES + 2
-    plain = replace(found, lines=(), pitches=(), thrust_pitches=())
-    assert plain == replace(known.excitation, lines=())
-    assert (found.pitches, found.thrust_pitches) == loud.pitches
+    assert replace(found, repeats=known.excitation.repeats) == known.excitation
+    assert (found.pitches, found.thrust_pitches) == (loud.pitches, loud.thrust_pitches)
 
 
 @pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])

@@ -13,6 +13,7 @@ import pytest
 from effect_runs import CATALOGUE, LOG
 
 from twin.effect import IO_SIZE, OUT, Effect, Excitation, X
+from twin.excitation import Repeating
 from twin.model.units import dimension
 
 RULED = {f"{e.name}-{p.name}": p for e in CATALOGUE.values() for p in e.parameters if p.start_rule}
@@ -25,7 +26,7 @@ def scaled(e: Excitation, force: float, length: float, time: float) -> Excitatio
     return Excitation(
         length * e.position_low, length * e.position_high, length / time * e.speed_max,
         force * e.dry_level, time * e.duration, time * e.period, force * e.force_max,
-        tuple(f / time for f in e.lines), tuple(length * r for r in e.ripples),
+        Repeating(tuple(f / time for f in e.lines)), tuple(length * r for r in e.ripples),
         length * e.resolution, other_joints=e.other_joints,
     )  # fmt: skip
 
@@ -129,7 +130,9 @@ def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(effect, most, trave
      ("force_constant_ripple", "thrust_pitches", (0.02, 0.04))],
 )  # fmt: skip
 def test_a_pitch_that_the_log_shows_may_be_that_of_a_harmonic(effect, known, wanted) -> None:
-    np.testing.assert_allclose(scan(effect, "p", replace(LOG, **{known: (0.02,)})), wanted)
+    np.testing.assert_allclose(
+        scan(effect, "p", replace(LOG, repeats=Repeating(**{known: (0.02,)}))), wanted
+    )
 
 
 def test_stops_are_tried_from_both_ends_alike_and_not_beyond_the_middle() -> None:
@@ -141,7 +144,7 @@ def test_stops_are_tried_from_both_ends_alike_and_not_beyond_the_middle() -> Non
 
 def test_lines_of_the_log_are_tried_and_a_ladder_where_there_are_none() -> None:
     assert tuple(scan("periodic_disturbance", "f")) == LOG.lines
-    ladder = scan("periodic_disturbance", "f", replace(LOG, lines=()))
+    ladder = scan("periodic_disturbance", "f", replace(LOG, repeats=Repeating()))
     np.testing.assert_allclose(ladder[1:] / ladder[:-1], 1.1)
     assert ladder[0] == 0.5
     assert ladder[-1] > 50.0

@@ -100,9 +100,7 @@ def _judged(
     return tuple(kept), nearly, lost
 
 
-def _loss(
-    alone: AxisModel, held: Mapping[str, float], motions: list[tuple[Array, float]]
-) -> Loss:
+def _loss(alone: AxisModel, held: Mapping[str, float], motions: list[tuple[Array, float]]) -> Loss:
     """What the attributes lose of one effect while the axis moves."""
     whole, left = [], []
     for motion, period in motions:
