@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.frequency.loop import Loop, loop_of
-from identify.frequency.plant import Plant, plant_of
+from identify.frequency.plant import Banded, Plant, plant_of
 from identify.frequency.response import Record, Response, response
 from twin.core.control import Controller
 from twin.errors import InputError
@@ -19,6 +19,8 @@ from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.progress import Progress, silent
 from twin.simulator import MujocoSimulator, ReducedSimulator
+
+NEAR = 0.1  # of a mass, to which a response of little friction tells it
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +33,25 @@ class Shown:
 
 
 @dataclass(frozen=True, eq=False)
+class Bias:
+    """That a model's own mass, kg, is not what its simulated response shows; None: shows none."""
+
+    own: float
+    back: Banded | None
+
+
+@dataclass(frozen=True, eq=False)
 class AxisFrequency:
-    """One axis: as the logs show it, and as the model in their place does; None without one."""
+    """One axis: as the logs show it, and as the model in their place does; None without one.
+
+    bias: where friction is so much of the force that not even the model's own mass comes back; then
+    no plant is read off either.
+    """
 
     units: AxisUnits
     measured: Shown
     modelled: Shown | None
+    bias: Bias | None = None
 
 
 def responses_of(
@@ -56,12 +71,23 @@ def responses_of(
     for i, name in enumerate(names):
         progress("frequency response", i, len(names))
         controller = None if model is None else Controller.for_axis(model.axes[name])
-        axes[name] = AxisFrequency(
-            first.axes[name].kind,
-            _shown(logs, name, controller),
-            _shown(simulated, name, controller) if simulated else None,
-        )
+        kind, measured = first.axes[name].kind, _shown(logs, name, controller)
+        axes[name] = AxisFrequency(kind, measured, None)
+        if model is not None:
+            modelled = _shown(simulated, name, controller)
+            bias = None if model.joints else _bias(model.axes[name].weighed.mass, modelled.plant)
+            if bias is not None:
+                measured, modelled = (replace(s, plant=None) for s in (measured, modelled))
+            axes[name] = AxisFrequency(kind, measured, modelled, bias)
     return axes
+
+
+def _bias(own: float, plant: Plant | None) -> Bias | None:
+    """Of the mass of a model, kg, that its response shows; None where it comes back."""
+    back = None if plant is None else plant.mass
+    if back and abs(back.value - own) < max(back.band, NEAR * own):
+        return None
+    return Bias(own, back)
 
 
 def _moves(log: Log, name: str) -> bool:

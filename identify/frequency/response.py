@@ -15,7 +15,7 @@ noise alone, and the rest of the variance is what is not linear.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ POWERS = np.arange(3)  # of the polynomials, for the response and for the transi
 UNKNOWNS = 2 * len(POWERS)
 LOUDEST = 10.0  # times its surroundings, above which a line, of a slow motion, is left out: what
 # friction makes of it would decide there
+WEAK = 10.0  # F of the force that the instrument makes, below which the ratio of two responses is
+# biased towards that of the noise, which feedback makes (D. Staiger, J. H. Stock, Instrumental
+# Variables Regression with Weak Instruments, Econometrica 65, 1997)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,8 @@ class Response:
     """Part of the power of force and of position, the smaller, that the instrument makes, 0..1."""
     band: Array
     """Radius, m/N, of the circle about the plant that holds the true one 9 times in 10."""
+    strength: Array
+    """F of what the instrument makes of the force."""
     period: float
     """s, between samples."""
 
@@ -74,13 +79,16 @@ class Response:
 
     @property
     def tells(self) -> NDArray[np.bool_]:
-        """Where a band twice as wide would not reach zero: of noise alone hardly any would."""
-        return np.asarray(2.0 * self.band < np.abs(self.plant))
+        """Where a band twice as wide would not reach zero: of noise alone hardly any would.
+
+        And where the instrument is not weak.
+        """
+        return (2.0 * self.band < np.abs(self.plant)) & (self.strength >= WEAK)
 
     def at(self, kept: NDArray[np.bool_]) -> Response:
         """The same at some of the frequencies."""
-        names = ("frequency", "plant", "spread", "noise", "closed", "coherence", "band")
-        return Response(**{n: getattr(self, n)[kept] for n in names}, period=self.period)
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Response(**{n: v[kept] if np.ndim(v) else v for n, v in values.items()})
 
 
 def response(records: Sequence[Record], count: int = 200, width: float = 0.03) -> Response:
@@ -120,6 +128,12 @@ class _Local:
     noise: Complex  # (2, 2), the part of noise; no number where nothing repeats
     explained: Array  # (2,) part of the power
     freedom: int
+
+    @property
+    def strength(self) -> float:
+        """F of the force's response."""
+        force, variance = abs(self.mean[0]) ** 2, float(np.real(self.covariance[0, 0]))
+        return float(force / variance) if variance > 0.0 else np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,8 +214,11 @@ def _repeats_after(signal: Array) -> int:
 def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> Response:
     """Responses of several logs as one, each weighed by its variance."""
     plant, closed = np.zeros((2, len(grid)), dtype=complex)
-    spread, noise, coherence, band = np.zeros((4, len(grid)))
-    for k, at in enumerate(zip(*found, strict=True)):
+    spread, noise, coherence, band, strength = np.zeros((5, len(grid)))
+    for k, each in enumerate(zip(*found, strict=True)):
+        at: Sequence[_Local] = each
+        strength[k] = max(one.strength for one in at)
+        at = [one for one in at if one.strength >= min(WEAK, strength[k])]
         quotients = [_ratio(one) for one in at]
         weight = np.array([1.0 / max(v, np.finfo(float).tiny) for _, v, _ in quotients])
         weight /= weight.sum()
@@ -215,7 +232,7 @@ def _together(grid: Array, found: Sequence[Sequence[_Local]], period: float) -> 
         freedom = sum(one.freedom for one in at)
         # The 90 % quantile of Fisher's F of 2 and 2 freedom degrees, in closed form.
         band[k] = spread[k] * np.sqrt(freedom * (0.1 ** (-1.0 / freedom) - 1.0))
-    return Response(grid, plant, spread, noise, closed, coherence, band, period)
+    return Response(grid, plant, spread, noise, closed, coherence, band, strength, period)
 
 
 def _ratio(one: _Local) -> tuple[complex, float, float]:

@@ -30,13 +30,30 @@ def frequency_text(result: FrequencyResponse) -> str:
         for title, shown in (("measured", axis.measured), (model, axis.modelled)):
             if shown is not None:
                 lines.append(f"  {title}")
-                lines += [f"    {what}: {value}" for what, value in read_off(shown, axis.units)]
+                lines += [f"    {what}: {value}" for what, value in read_off(shown, axis)]
+        lines.append(f"  {_caution(axis)}")
     return "\n".join(lines)
 
 
-def read_off(shown: Shown, units: AxisUnits) -> list[tuple[str, str]]:
+def _caution(axis: AxisFrequency) -> str:
+    """What friction does to values that are read off a response."""
+    mass, bias = axis.units.mass_name, axis.bias
+    if bias is None:
+        known = f"; the model's own {mass} comes back from its simulation"
+        asked = "; with MODEL, whose simulation shows how much"
+        return f"friction adds to these values{known if axis.modelled else asked}"
+    own = number(bias.own)
+    back = "none" if bias.back is None else _with_band(bias.back, axis.units.mass)
+    return (
+        f"{mass} and delay are not read off: of the model's own {own} {axis.units.mass} its "
+        f"simulation on this motion shows {back}, as friction is too much of the force; "
+        "`twin simulate multisine` excites more"
+    )
+
+
+def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
     """What a response tells, each by name in words, with its 90 % band."""
-    found, kept = shown.response, shown.response.tells
+    found, kept, units = shown.response, shown.response.tells, axis.units
     if not kept.any():
         return [("frequencies", "none tells; the band of the response reaches zero at each")]
     low, high = found.frequency[kept][[0, -1]]
@@ -45,6 +62,8 @@ def read_off(shown: Shown, units: AxisUnits) -> list[tuple[str, str]]:
     if np.isfinite(found.noise).any():
         share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))
         facts.append(("neither noise nor linear", f"{percent(share)} of its variance (median)"))
+    if axis.bias is not None:
+        return [*facts, _loop(shown)]
     if shown.plant is None:
         few = "too few frequencies to read it off; `twin simulate multisine` excites more"
         return [*facts, (units.mass_name, few), _loop(shown)]

@@ -61,11 +61,22 @@ class ShownEntry(Entry):
     loop: LoopEntry | None
 
 
+class BiasEntry(Entry):
+    """The model's own mass, and what its simulated response shows of it."""
+
+    own: Number
+    back: BandedEntry | None
+
+
 class AxisFrequencyEntry(Entry):
-    """One axis as the logs show it, and as the model in their place does."""
+    """One axis as the logs show it, and as the model in their place does.
+
+    bias: null where the model's own mass comes back; else no plant is read off.
+    """
 
     measured: ShownEntry
     modelled: ShownEntry | None
+    bias: BiasEntry | None
 
 
 class FrequencyAnswer(Answer):
@@ -90,6 +101,7 @@ def _axis(axis: AxisFrequency) -> AxisFrequencyEntry:
             band_90=found.band, plant=plant, loop=one.loop,
         )  # fmt: skip
 
-    return AxisFrequencyEntry(
-        measured=shown(axis.measured), modelled=shown(axis.modelled) if axis.modelled else None
-    )
+    return AxisFrequencyEntry.of(
+        axis, measured=shown(axis.measured),
+        modelled=shown(axis.modelled) if axis.modelled else None,
+    )  # fmt: skip

@@ -71,7 +71,7 @@ def _chart(
 
 def _table(found: AxisFrequency) -> Table:
     """What is read off each, side by side."""
-    told = {name: dict(read_off(shown, found.units)) for name, shown, _ in _shown(found)}
+    told = {name: dict(read_off(shown, found)) for name, shown, _ in _shown(found)}
     rows = dict.fromkeys(name for facts in told.values() for name in facts)
     titles = ("Read off, with 90 % band", *(name.capitalize() for name in told))
     cells = [(row, *(facts.get(row, NOTHING) for facts in told.values())) for row in rows]

@@ -118,6 +118,46 @@ def test_the_margins_are_those_of_the_loop() -> None:
     assert told.phase_margin == pytest.approx(np.angle(-exact[falls]), abs=0.1)
 
 
+def test_where_the_setpoint_makes_none_of_the_force_nothing_is_told() -> None:
+    """There the ratio is that of noise, which feedback makes: as sure as it is wrong."""
+    noisy = replace(MACHINE, noise=5e-5, load=1e-3)
+    found = response([recorded(wandering, noisy, seed) for seed in range(3)])
+    wrong = np.abs(found.plant / noisy.response(found.frequency) - 1.0)
+    assert wrong[2.0 * found.band < np.abs(found.plant)].max() > 10.0
+    assert wrong[found.tells].max() < 5.0
+
+
+RUBBING = """
+sample_rate = 2000.0
+[axes.x]
+mass = 3.0
+travel = [0.0, 0.3]
+velocity = 0.34
+acceleration = 2.4
+jerk = 120.0
+bandwidth = 30.0
+[axes.x.effects.coulomb_viscous]
+Fc = 2.0
+Fs = 2.0
+sigma2 = 8.0
+"""
+
+
+def test_no_mass_is_read_off_where_not_even_that_of_the_model_comes_back(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(RUBBING)
+    model = load_model(tmp_path / "m.toml")
+    log = simulate(model, "tracking", seed=1, duration=6.0)
+    found = identify.frequency_response(log, model)
+    axis = found.axes["x"]
+    assert axis.bias is not None
+    assert axis.bias.own == 3.0
+    assert axis.bias.back.value - axis.bias.back.band > 3.0
+    assert axis.measured.plant is axis.modelled.plant is None
+    assert "mass and delay are not read off: of the model's own 3.00 kg" in str(found)
+    without = str(identify.frequency_response(log))
+    assert "friction adds to these values; with MODEL" in without
+
+
 def test_what_cannot_be_told_is_refused_in_one_line() -> None:
     record = recorded(wandering)
     with pytest.raises(InputError, match="give logs of one rate"):
