@@ -77,9 +77,12 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     del hats  # columns of all logs are large
     assumed = _read_off(gram, met)
     correction, spread = _corrected(linear, shape.stiffness)
-    coordinate, index = _knots(shape)
+    knots, index = _knots(shape)
+    coordinate = np.unique(np.clip(knots, *_covered(shape, dataset)))
+    between = np.stack([np.interp(coordinate, knots, unit) for unit in np.eye(len(knots))], axis=1)
     curves = {}
-    for name, weights in _directions(shape, index, names).items():
+    for name, at_knots in _directions(shape, index, names).items():
+        weights = between @ at_knots
         full = np.zeros((len(weights), len(own)))
         full[:, own] = weights
         visits = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", weights, gram, weights), 0.0))
@@ -94,6 +97,18 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     return FoundShape(
         shape.curve.over, coordinate, unit, shape.period, shape.lets_go, force, curves
     )
+
+
+def _covered(shape: Shape, dataset: Dataset) -> tuple[float, float]:
+    """The ends of a coordinate that does not repeat, between which training logs have been."""
+    if shape.period is not None:
+        return -np.inf, np.inf
+    been = {
+        Coordinate.POSITION: lambda m: m.position,
+        Coordinate.SPEED: lambda m: np.abs(m.velocity),
+    }
+    where = np.concatenate([been[shape.curve.over](log.motion) for log in dataset.fit])
+    return float(where.min()), float(where.max())
 
 
 def _knots(shape: Shape) -> tuple[Array, list[int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class Source:
     def filled(self, text: str, names: Names) -> str:
         """A command with this model and these logs in the place of MODEL and LOG...
 
-        A plan reads no test logs.
+        A plan reads no test logs. What is written has another name than the model.
         """
         given = [
             f"{OPTIONS[role]}{shlex.quote(name)}"
@@ -39,6 +40,10 @@ class Source:
             if role is not Role.TEST or not text.startswith("twin plan")
         ]
         every = " ".join([*given, *([self.options] if self.options else [])])
+        begun, _, written = text.rpartition("-o ")
+        if again := re.fullmatch(rf"{Path(written).stem}(?:_(\d+))?", Path(self.model).stem):
+            name = f"{Path(written).stem}_{int(again[1] or 1) + 1}{Path(written).suffix}"
+            text = f"{begun}-o {name}"
         return text.replace("LOG...", every).replace("MODEL", shlex.quote(self.model))
 
 

@@ -105,6 +105,17 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
     assert re.search(r"Date20\d\d-\d\d-\d\d", text)
 
 
+@pytest.mark.parametrize(
+    ("model", "written"),
+    [("drive.toml", "better.toml"), ("better.toml", "better_2.toml"),
+     ("out/better_2.toml", "better_3.toml")],
+)  # fmt: skip
+def test_the_next_command_does_not_write_over_its_model(model: str, written: str) -> None:
+    command = Source(model=model).filled("twin add cogging MODEL LOG... -o better.toml", {})
+    assert command.startswith(f"twin add cogging {model}")
+    assert command.endswith(f" -o {written}")
+
+
 def signals_in(page: str) -> list[dict[str, Any]]:
     found = re.search(r'id="signals">(.*?)</script>', page, re.DOTALL)
     assert found

@@ -17,6 +17,7 @@ from identify.output.words.commands import next_commands
 from identify.output.words.diagnosis import verdict_in_words
 from identify.output.words.findings import finding_in_words
 from identify.selection.curves import shapes_of
+from identify.selection.found_shape import found_shape
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind
 from identify.selection.trying import try_effect
@@ -169,7 +170,12 @@ def test_a_curve_of_friction_is_offered_where_both_directions_are_well_visited(
     speed = np.concatenate([p.test_function.mean(p.motion.velocity) for p in dataset.fit])
     behind = float(np.mean(speed[fit.kept] < 0.0))
     assert behind > 0.4 if offered else behind < 0.07
-    assert [s.effect for s in shapes_of(fit, dataset)] == ["coulomb_viscous"] * offered
+    shapes = shapes_of(fit, dataset)
+    assert [s.effect for s in shapes] == ["coulomb_viscous"] * offered
+    for shape in shapes:  # drawn where the logs have been, and nowhere else
+        places = np.concatenate([log.motion.position for log in dataset.fit])
+        drawn = found_shape(shape, fit, dataset).coordinate
+        assert (drawn[0], drawn[-1]) == (places.min(), places.max())
 
 
 PITCHES = (0.0113, 0.0171, 0.0079, 0.0253, 0.0061)  # m
