@@ -17,9 +17,9 @@ from identify.output.words.commands import next_commands
 from identify.output.words.diagnosis import verdict_in_words
 from identify.output.words.findings import finding_in_words
 from identify.selection.curves import shapes_of
-from identify.selection.found_shape import found_shape
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind
+from identify.selection.found_shape import found_shape
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted
