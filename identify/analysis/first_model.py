@@ -49,6 +49,8 @@ NAMES = ("mass", "coulomb", "viscous", "constant")  # of the first columns; othe
 class FirstValues:
     """mass kg, None where the logs do not tell it; coulomb N, viscous N s/m, 0 where there is none.
 
+    reversed: kg less than 0, of which force and motion are; 0 where they are of no such mass.
+
     constant: N that the command takes beside the others, 0 where the logs do not ask for it.
     static: N, None where the axis does not break away from rest by more than its Coulomb friction.
     """
@@ -58,6 +60,7 @@ class FirstValues:
     viscous: float
     constant: float
     static: float | None
+    reversed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,18 +85,19 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
         if abs(np.mean(np.sign(columns[1]))) > ONE_WAY:
             columns = _without(columns, "constant")  # it would be the friction of that way
         found = _with_friction(columns, force)
-        inertial = found.sure("mass") * float(np.std(columns[0]))
-        told = inertial > LEAST_INERTIAL * float(np.std(force))
-        if told:
+        mass = found.sure("mass")
+        told = abs(mass) * float(np.std(columns[0])) > LEAST_INERTIAL * float(np.std(force))
+        if told and mass > 0.0:
             break
     coulomb = found.sure("coulomb")
     static = _static(motions, found, place)
     return FirstValues(
-        mass=found.sure("mass") if told else None,
+        mass=mass if told and mass > 0.0 else None,
         coulomb=coulomb,
         viscous=found.sure("viscous"),
         constant=found.sure("constant"),
         static=static if static is not None and static > MORE * coulomb > 0.0 else None,
+        reversed=min(mass, 0.0) if told else 0.0,
     )
 
 
@@ -277,6 +281,12 @@ def _first_axis(
     covered, units = excitation(motions, None), motions[0].units
     if found.mass is None and joint is None:
         names = ", ".join(m.name for m in motions)
+        if found.reversed:
+            raise InputError(
+                f"axis {axis}: in {names} force and motion are as if the {units.mass_name} were "
+                f"{found.reversed:.2g} {units.mass}; give the force or the position the sign -1 "
+                "in the import map"
+            )
         raise InputError(
             f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
             "little of the force; give a log with faster changes of speed"

@@ -156,7 +156,7 @@ def new(
         for axis, labels in unknown.items()
         for label in labels
     ]
-    text = f"{out}: axes {', '.join(model.axes)}; now `twin fit {out} {logs[0]} -o fitted.toml`"
+    text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
     return Said("\n".join([text, *notes]), answer, [*recorded.findings, *doubts])

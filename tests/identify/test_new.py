@@ -133,6 +133,13 @@ def test_logs_that_tell_no_mass_stand_still_or_differ_in_rate_are_refused():
         first_model({"l": drive(), "m": drive(rate=500.0)}, "m", CATALOGUE)
 
 
+def test_a_force_of_the_other_sign_is_refused_as_what_it_is():
+    log = drive()
+    columns = dict(log.axes["a"].columns)
+    with pytest.raises(InputError, match=r"as if the mass were -3 kg; .* the sign -1"):
+        first_axis(Log(1000.0, {"a": AxisLog({**columns, "force": -columns["force"]})}))
+
+
 def test_the_emps_drive_has_the_published_values(shared_data):
     """A. Janot et al. 2019: 95.1 kg, 20.4 N, 203.5 N s/m, offset -3.16 N of the command."""
     examples = Path(__file__).parents[2] / "examples"
