@@ -94,18 +94,21 @@ def import_(
     from identify.output.answers.machine import LogAnswer
     from twin.checks import check_assumed
     from twin.importers import import_log, load_mapping
+    from twin.importers.guess import doubts_of
     from twin.logs import write_log
 
     if guess:
         return _guess(sources, out)
     if mapping is None or out is None:
         raise InputError("give --map MAP and -o LOG; --guess proposes a map")
-    log = import_log(sources, load_mapping(mapping))
+    known = load_mapping(mapping)
+    log = import_log(sources, known)
     write_log(log, out)
     answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
-    warnings = [*resampled, *(f"{out}: warning: {finding}" for finding in unsure)]
+    doubts = (f"{mapping}: warning: {doubt}" for doubt in doubts_of(known))
+    warnings = [*resampled, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
     return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
 
 

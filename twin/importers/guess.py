@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.importers.importer import table_of
-from twin.importers.mapping import EVERY_COLUMN
+from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.table import numbers
 from twin.importers.units import find_unit
 from twin.logs.container import reading
@@ -425,3 +425,24 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
 
 def _table(name: str, unit: str | None) -> str:
     return f"{{column = {json.dumps(name)}, unit = {json.dumps(unit, ensure_ascii=False)}}}"
+
+
+def doubts_of(mapping: ImportMap) -> Iterator[str]:
+    """What a map lacks, and units that the names of its columns state otherwise, in brackets."""
+    for name, axis in mapping.axes.items():
+        for field, column in axis.columns.items():
+            found = _UNIT_IN_NAME.search(column.name)
+            stated = found and found[1]
+            if column.scale != 1.0 or not stated or not is_unit(stated, *_KINDS):
+                continue
+            unit = find_unit(stated, *_KINDS)
+            if unit.si != column.si.si or not np.isclose(unit.size, column.si.size):
+                yield (
+                    f"axes.{name}.{field}: its column '{column.name}' is in {stated} by its name, "
+                    f"in {column.unit} by the map; correct one of them"
+                )
+        if "force" not in axis.columns and axis.force_constant is None:
+            yield (
+                f"axes.{name}: has a current and no force_constant, so no force; add it to the map "
+                "(N/A, see the motor's data sheet)"
+            )

@@ -187,6 +187,28 @@ def test_import_check_and_the_report_say_it(guessed):
     assert "the import map assumes position in" in head
 
 
+@pytest.mark.parametrize(
+    ("current", "said"),
+    [
+        ('{column = "i [A]", unit = "mA"}\nforce_constant = 12.0', "in A by its name, in mA by"),
+        ('{column = "i [A]", unit = "A"}', "has a current and no force_constant"),
+        ('{column = "i [A]", unit = "A"}\nforce_constant = 12.0', ""),
+    ],
+)
+def test_import_says_where_a_name_has_another_unit_and_where_no_force_can_be(
+    tmp_path: Path, current: str, said: str
+) -> None:
+    rows = "\n".join(f"{np.sin(0.01 * k)},{np.cos(0.01 * k)}" for k in range(1000))
+    (tmp_path / "a.csv").write_text(f"x_m,i [A]\n{rows}\n")
+    position = 'position = {column = "x_m", unit = "mm"}'  # which may be a motor's, no length
+    text = f"sample_rate = 1000.0\n[axes.x]\n{position}\ncurrent = {current}\n"
+    (tmp_path / "map.toml").write_text(text)
+    done = cli_runs.twin("import", "a.csv", "--map", "map.toml", "-o", "a.mcap", folder=tmp_path)
+    assert done.returncode == 0
+    assert said in done.stderr
+    assert bool(done.stderr) is bool(said)
+
+
 def test_a_map_by_hand_assumes_nothing_and_comments_are_no_entries():
     text = '# correct what is ASSUMED\n[axes.x]\nposition = {column = "q", unit = "m"} # known\n'
     assert assumptions(text, "x") == []
