@@ -59,6 +59,9 @@ class Ride:
         ]
 
 
+FIRST = Ride(1)
+
+
 def logged(
     axis: AxisModel,
     ride: Ride,
@@ -112,7 +115,7 @@ def asked(
     true: AxisModel,
     catalogue: Catalogue,
     beside: Callable[[Array, Array], Array] | None = None,
-    ride: Ride = Ride(1),
+    ride: Ride = FIRST,
 ) -> AxisDiagnosis:
     """The diagnosis of a base from two logs of another machine, and one held out."""
     rides = [replace(ride, seed=ride.seed + i) for i in range(3)]
