@@ -61,7 +61,7 @@ dist:
 	$(PYTHON) -m venv --without-pip build/installed
 	build/tools/bin/python -m pip --python build/installed/bin/python install --quiet dist/*.whl
 	build/installed/bin/twin --version
-	build/tools/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible \
+	build/tools/bin/cyclonedx-py environment --pyproject pyproject.toml \
 		--output-file build/proton-twin.cdx.json build/installed/bin/python
 
 $(VENV)/runtime: pyproject.toml

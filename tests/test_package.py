@@ -145,10 +145,9 @@ def test_what_is_published_runs_in_an_empty_environment_and_lists_what_it_brings
         subprocess.run(words, cwd=empty / "recording", check=True, capture_output=True)
     text = (tmp_path / "build" / "proton-twin.cdx.json").read_text(encoding="utf-8")
     bill = json.loads(text)
-    assert (bill["bomFormat"], bill["metadata"]["component"]["name"]) == (
-        "CycloneDX",
-        "proton-twin",
-    )
+    assert bill["metadata"]["component"]["name"] == "proton-twin"
+    # By these the release attests it; the serial number is lost where the output is reproducible.
+    assert {"bomFormat", "serialNumber", "specVersion"} <= set(bill)
     listed = {canonicalize_name(component["name"]) for component in bill["components"]}
     assert {name for name, _ in asked(SETTINGS["project"]["dependencies"])} <= listed
     assert str(tmp_path) not in text

@@ -260,8 +260,11 @@ def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, lay
 
 
 def test_a_recovery_takes_little_memory(tmp_path):
-    """As much as the steps that it takes, whatever the length of the log."""
-    noise = np.random.default_rng(1).standard_normal((2, 1_000_000))
+    """As much as the steps that it takes, whatever the length of the log.
+
+    Early releases of Python 3.12 and 3.13 hold what a caught error saw: 22 MB in all, else 13.
+    """
+    noise = np.random.default_rng(1).standard_normal((2, 1_500_000))
     path = tmp_path / "a.mcap"
     write_log(Log(1e4, {"x": AxisLog({"position": noise[0], "force": noise[1]})}), path)
     ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
