@@ -128,6 +128,13 @@ def test_actions_are_pinned_and_every_job_says_what_it_may_do():
         assert "\npermissions:\n" in text
 
 
+def test_the_versions_of_python_that_are_named_are_tested():
+    named = re.findall(r"Python :: (3\.\d+)", " ".join(SETTINGS["project"]["classifiers"]))
+    text = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
+    assert f"python: {json.dumps(named)}\n" in text
+    assert SETTINGS["project"]["requires-python"] == f">={named[0]}"
+
+
 @pytest.mark.slow  # a minute: everything is installed from the index
 def test_what_is_published_runs_in_an_empty_environment_and_lists_what_it_brings(tmp_path):
     for name in ("twin", "identify", "models", "examples"):
