@@ -155,6 +155,8 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
         lines += _candidates(d)
         lines += [f"  {line}" for line in said.steps]
         lines += [f"  note: {note}" for note in said.notes]
+    still = (axis for axis in result.model.axes if axis not in result.axes)
+    lines += [f"axis {axis}: not diagnosed, as it moves in no log" for axis in still]
     return "\n".join(lines)
 
 
@@ -240,7 +242,10 @@ def feedforward_text(result: Feedforward) -> str:
             f"  {name}: {quantity(e.rms, unit)}, {quantity(e.largest, unit)}"
             for name, e in found.by_feedforward.items()
         ]
-        lines += [f"    {e} gains {quantity(gain, unit)}" for e, gain in found.gains.items()]
+        lines += [
+            f"    with all but {e}: RMS {quantity(gain, unit)} larger"
+            for e, gain in found.gains.items()
+        ]
         lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]
     return "\n".join(lines)
 

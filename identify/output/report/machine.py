@@ -96,6 +96,9 @@ def worth(view: AxisView) -> list[Block]:
         f"In simulation, on the motion of {', '.join(result.logs)}, of a machine that is as the "
         "final model."
     )
-    told = [f"{effect} gains {quantity(gain, unit)}." for effect, gain in found.gains.items()]
+    told = [
+        f"With all but {effect} fed forward, the RMS error is {quantity(gain, unit)} larger."
+        for effect, gain in found.gains.items()
+    ]
     told += [f"Not in it: {effect}, {why}." for effect, why in result.lost[view.name].items()]
     return [Table(("Tracking error", "RMS", "Largest"), rows, caption), Listing(told)]

@@ -103,6 +103,8 @@ VERDICTS = {
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis, what the logs cannot separate, and what test logs contradict."""
     said = [VERDICTS.get(found.verdict) or _proved(found)]
+    if reshaped := _reshaped(found):
+        said.append(f"The law of {listed(reshaped)} has another shape too.")
     said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
     said += [capitalised(against)] if (against := not_confirmed_in_words(found)) else []
     return " ".join(said)
@@ -114,6 +116,12 @@ def _proved(found: AxisDiagnosis) -> str:
     if found.dataset.holdout:
         proof = f"the training logs and the selection logs prove {them}"
     return f"The model lacks {lacks}: {proof}."
+
+
+def _reshaped(found: AxisDiagnosis) -> list[str]:
+    """The effects whose law has another shape, beside those that are missing."""
+    reshaped = [f.effect for f in found.findings if f.kind is FindingKind.WRONG_SHAPE]
+    return reshaped if found.missing else []
 
 
 def _ties(found: AxisDiagnosis) -> str:
@@ -132,6 +140,8 @@ def headline_in_words(found: AxisDiagnosis) -> str:
         case Verdict.MISSING_EFFECTS:
             are = "are" if len(found.named) > 1 else "is"
             answer = f"{named_in_words(found)} {are} missing"
+            if reshaped := _reshaped(found):
+                answer += f", and {listed(reshaped)} has another shape"
         case Verdict.WRONG_SHAPE:
             answer = f"{found.findings[0].effect} has another shape"
         case Verdict.UNEXPLAINED:
@@ -163,8 +173,11 @@ def all_found(found: AxisDiagnosis) -> str:
     """A label for what was found: the effect where it is one; "" where nothing was."""
     if found.final is found.base:
         return ""
-    names = dict.fromkeys(f.effect for f in found.findings)
-    return spaced(next(iter(names))) if len(names) == 1 else "all that was found"
+    if len(found.findings) != 1:
+        return "all that was found"
+    (only,) = found.findings
+    reshaped = only.kind is FindingKind.WRONG_SHAPE
+    return spaced(f"another shape of {only.effect}" if reshaped else only.effect)
 
 
 def tested_on(found: AxisDiagnosis) -> str:
