@@ -16,6 +16,7 @@ import typer
 from identify.cli.command import Said, require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
+    ASSUMES,
     MEANINGLESS,
     CheckedRecordings,
     Effects,
@@ -29,7 +30,9 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
+    briefly,
     loaded,
+    minor,
     said_of,
     with_logs,
 )
@@ -79,7 +82,7 @@ def fit(
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.fit, catalogue=catalogue, test_function=test_function)
     fitted, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
-    warnings = [*findings, *silent]
+    warnings = [*briefly(findings), *silent]
     result: FitResult | SimulationFit = fitted
     if objective is Objective.SIMULATION:
         with progress_on_stderr() as progress:
@@ -119,7 +122,7 @@ def compare(
         _report(html, title, source, None, result, findings, known)
     if mcap:
         workflow.side_by_side_of(result).write(mcap)
-    return said_of(result, [*findings, *silent], left_out=silent)
+    return said_of(result, [*briefly(findings), *silent], left_out=silent)
 
 
 @app.command()
@@ -153,7 +156,7 @@ def diagnose(
             )  # fmt: skip
         _report(html, title, source, result, result.comparison, findings, known)
     answer = answer_of(result, data_faults=findings, left_out=silent)
-    return Said(diagnose_text(result, source), answer, [*findings, *silent])
+    return Said(diagnose_text(result, source), answer, [*briefly(findings), *silent])
 
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
@@ -181,8 +184,8 @@ def _report(
     history = (diagnosis or comparison).model.history
     write_report(
         out,
-        Subject(title, diagnosis, comparison, history, source=source, machine=known),
-        assumed=[line for line in findings if "the import map assumes" in line],
+        Subject(title, diagnosis, comparison, history, (), source, known, minor(findings)),
+        assumed=[line for line in findings if ASSUMES in line],
         faults=[line for line in findings if ": error: " in line],
     )
 
@@ -228,7 +231,7 @@ def add(
     if file:
         write_atomically(file, (result.model.mjcf or "").encode())
     save_model(result.model, out)
-    return said_of(result, [*findings, *silent], result.kept, left_out=silent)
+    return said_of(result, [*briefly(findings), *silent], result.kept, left_out=silent)
 
 
 def _copy_of(machine: MachineModel, out: Path) -> Path:
@@ -304,7 +307,7 @@ def feedforward(
     result, findings, silent = with_logs(
         partial(workflow.feedforward, before=earlier), machine, logs
     )
-    return said_of(result, [*findings, *silent])
+    return said_of(result, [*briefly(findings), *silent])
 
 
 @app.command()
@@ -347,7 +350,7 @@ def frf(
         result.write(out)
     if plot:
         save_picture(result.plot(), plot)
-    return said_of(result, recorded.findings)
+    return said_of(result, briefly(recorded.findings))
 
 
 @app.command()
@@ -385,9 +388,9 @@ def plan(
     )  # fmt: skip
     result, findings, silent = with_logs(job, machine, logs, holdout)
     if not result.decides:
-        return said_of(result, [*findings, *silent], fine=False)
+        return said_of(result, [*briefly(findings), *silent], fine=False)
     chosen, table = result.chosen, out.with_suffix(ENDING)
-    said = said_of(result, [*findings, *silent], file=out, setpoints=table)
+    said = said_of(result, [*briefly(findings), *silent], file=out, setpoints=table)
     save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
     write_setpoints(chosen.experiment, machine, 0, table)
     text = (

@@ -18,6 +18,7 @@ from identify.cli.shared import (
     ModelOption,
     Recordings,
     app,
+    briefly,
     left_out,
     loaded,
 )
@@ -162,7 +163,7 @@ def new(
     text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
-    return Said("\n".join([text, *notes]), answer, [*recorded.findings, *doubts])
+    return Said("\n".join([text, *notes]), answer, [*briefly(recorded.findings), *doubts])
 
 
 @app.command()
@@ -295,7 +296,8 @@ def export(
     for file, content in zip(files, made.files.values(), strict=True):
         write_atomically(file, content.encode() if isinstance(content, str) else content)
     answer = ExportAnswer.of(made, format=to, files=files)
-    return Said("\n".join([*map(str, files), export_text(made)]), answer, recorded.findings)
+    text = "\n".join([*map(str, files), export_text(made)])
+    return Said(text, answer, briefly(recorded.findings))
 
 
 @app.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 MEANINGLESS = ("SIGN", "UNIT", "SWAPPED")  # faults with which a fit gives numbers without a meaning
+ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 app = Commands(
@@ -153,6 +155,21 @@ class CheckedRecordings(Recordings):
                 raise InputError(f"{path}: {finding}; nothing is fitted to it")
             self.findings.append(f"{path}: {finding.severity.value}: {finding}")
         return log
+
+
+def minor(findings: Sequence[str]) -> list[str]:
+    """Warnings that leave an answer its meaning: no errors, nor what an import map assumes."""
+    return [line for line in findings if ": warning: " in line and ASSUMES not in line]
+
+
+def briefly(findings: Sequence[str]) -> list[str]:
+    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them."""
+    folded = minor(findings)
+    counts = Counter(line.partition(": warning: ")[0] for line in folded)
+    return [line for line in findings if line not in folded] + [
+        f"{log}: {n} warning{'s' if n > 1 else ''}; `twin check {log}` tells what to do"
+        for log, n in counts.items()
+    ]
 
 
 def with_logs(

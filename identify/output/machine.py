@@ -139,7 +139,7 @@ def _lines(name: str, info: LogInfo) -> list[str]:
         f"{name}: {info.duration:.4g} s, {info.samples} samples at {info.sample_rate:g} Hz, "
         f"{'axis' if len(info.axes) == 1 else 'axes'} {', '.join(info.axes)}"
     ]
-    if said := ", ".join(f"{key} {value}" for key, value in info.metadata.items()):
+    if said := ", ".join(f"{key} {_in_a_line(value)}" for key, value in info.metadata.items()):
         lines.append(f"  written by: {said}")
     for axis, own in info.axes.items():
         lines.append(f"  axis {axis} ({_about(own)})")
@@ -148,6 +148,12 @@ def _lines(name: str, info: LogInfo) -> list[str]:
             f"    {c.name:{width}s}  {c.least:.6g} to {c.most:.6g} {c.unit}" for c in own.channels
         ]
     return [*lines, f"  check: {_checked(name, info)}"]
+
+
+def _in_a_line(value: str) -> str:
+    """What a writer said, or of a whole file its length; --json has all of it."""
+    lines = value.splitlines()
+    return value if len(lines) < 2 else f"({len(lines)} lines)"
 
 
 def _about(axis: AxisInfo) -> str:

@@ -44,7 +44,7 @@ def parameters(result: FitResult) -> str:
     for axis, fit in result.fits.items():
         said = [capitalised(line) for line in fit_in_words(result, axis)]
         table = fit_table(fit.axis, {"Value": result.estimates[axis]}, fit.floor)
-        blocks += [Listing(said), table]
+        blocks += [Listing(said), *table]
     return fragment(blocks)
 
 

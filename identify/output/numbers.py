@@ -89,9 +89,9 @@ def span(low: float, high: float, unit: str) -> str:
     return f"{first} and {second} {scale.unit}".rstrip()
 
 
-def change(before: float, after: float, unit: str) -> tuple[str, str]:
+def change(before: float, after: float, unit: str | Scale) -> tuple[str, str]:
     """Two SI values in one unit, with digits that tell them apart; the second has the unit."""
-    scale = Scale.of(unit, [before, after])
+    scale = unit if isinstance(unit, Scale) else Scale.of(unit, [before, after])
     pair, digits = (before / scale.size, after / scale.size), DIGITS
     while number(pair[0], digits) == number(pair[1], digits) and before != after and digits < 15:
         digits += 1

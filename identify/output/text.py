@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
-from identify.output.numbers import Scale, arrow, number, quantity
+from identify.output.numbers import Scale, arrow, change, number, quantity
 from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
 from identify.output.words.body import body_in_words, corrected_in_words
 from identify.output.words.commands import UNKNOWN, Source, names_of
@@ -165,10 +165,9 @@ def _errors(found: AxisDiagnosis, summary: AxisSummary) -> str:
     unit, floor = found.base.axis.units.force, summary.floor
     base, final = found.base.error, found.final.error
     if found.final is found.base:
-        return f"on the training logs {quantity(base, unit)}, {over_floor(base, floor, unit)}"
+        return f"on the training logs {quantity(base, unit)}, {over_floor(unit, floor, base)}"
     errors = f"{arrow(base, final, unit)} with {all_found(found)}"
-    ratio = f"ratio {base / floor:.2f} -> {final / floor:.2f}"
-    return f"on the training logs {errors}, noise floor {quantity(floor, unit)} ({ratio})"
+    return f"on the training logs {errors}, {over_floor(unit, floor, base, final)}"
 
 
 def _candidates(found: AxisDiagnosis) -> Iterator[str]:
@@ -183,7 +182,8 @@ def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
     why = why_not(found, c)
     if c.score is None:
         return f"  {c.effect.name:28s} not refitted: {why}"
-    errors = arrow(c.gain.before, c.gain.after, c.fit.axis.units.force)
+    scale = Scale.of(c.fit.axis.units.force, c.gain.before)
+    errors = " -> ".join(change(c.gain.before, c.gain.after, scale))
     return f"  {c.effect.name:28s} {c.delta_bic:10.1f}   {errors}   {why}".rstrip()
 
 
@@ -214,9 +214,10 @@ def add_text(result: Addition) -> str:
         lines.append(f"  {what:33s} {arrow(before, after, step.unit)}")
     if result.position_error is not None and result.replayed is not None:
         unit = result.units.position
+        scale = Scale.of(unit, result.position_error)
         lines.append(
             f"  {words('free-running position error'):33s} {arrow(*result.position_error, unit)} "
-            f"on {result.position_log} (MuJoCo: {quantity(result.replayed, unit)})"
+            f"on {result.position_log} (MuJoCo: {scale.text(result.replayed)})"
         )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:

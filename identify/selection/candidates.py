@@ -36,7 +36,7 @@ SURE = 0.85  # of a noise floor; of less error its estimate would be refuted
 MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
-NO_SCORE = "a linear step takes too little for a refit"
+NO_SCORE = "by one linear step it gains too little"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

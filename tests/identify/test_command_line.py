@@ -17,7 +17,7 @@ from strict_json import valid
 
 from identify.cli import main
 from identify.cli.command import OUTPUTS, Command
-from identify.cli.shared import CheckedRecordings, Recordings, app
+from identify.cli.shared import CheckedRecordings, Recordings, app, briefly
 from twin.checks import check_log
 from twin.errors import InputError
 from twin.experiments.named import simulate
@@ -221,6 +221,15 @@ def test_a_drive_too_weak_for_its_motion_is_told_of(tmp_path):
     assert "axis x" in line
     assert "outside its travel" in line
     assert twin(*command, folder=tmp_path).stderr == ""
+
+
+def test_warnings_on_a_log_are_one_line_that_says_where_they_are_told():
+    doubt, other = "a.mcap: warning: axis x: jitter", "a.mcap: warning: axis x: one way; move back"
+    wrong, assumed = "b.mcap: error: SIGN", "b.mcap: warning: the import map assumes the unit of x"
+    assert briefly([doubt, wrong, other, assumed]) == [
+        wrong, assumed, "a.mcap: 2 warnings; `twin check a.mcap` tells what to do",
+    ]  # fmt: skip
+    assert briefly([doubt]) == ["a.mcap: 1 warning; `twin check a.mcap` tells what to do"]
 
 
 def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):

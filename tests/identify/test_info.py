@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import cli_runs
@@ -20,7 +21,7 @@ import twin
 from identify.cli import app, doctor
 from twin.checks.long import log_info
 from twin.errors import InputError
-from twin.logs import ROTARY_UNITS, AxisLog, Log, write_log
+from twin.logs import ROTARY_UNITS, AxisLog, Log, read_log, write_log
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +66,13 @@ def test_what_was_written_is_told_in_text_and_as_one_object(rotary) -> None:
         assert (told["unit"], told["least"], told["most"]) == (
             unit, pytest.approx(least, abs=1e-5), pytest.approx(most, abs=1e-5),
         )  # fmt: skip
+
+
+def test_a_file_that_a_log_carries_is_told_by_its_length(rotary, tmp_path) -> None:
+    log = replace(read_log(rotary), metadata={"import_map": "# by hand\n[axes.a]\n"})
+    write_log(log, tmp_path / "a.mcap")
+    said = cli_runs.twin("info", "a.mcap", folder=tmp_path).stdout
+    assert said.splitlines()[1] == "  written by: import_map (2 lines)"
 
 
 def test_faults_are_one_line_and_a_file_that_is_no_log_too(tmp_path) -> None:

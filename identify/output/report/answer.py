@@ -123,7 +123,7 @@ def _compared(view: AxisView) -> Answer:
 
 
 def notes(subject: Subject) -> list[Block]:
-    """Notes of all axes and of the model's history, each once."""
+    """Notes of all axes, of the model's history and of the check of the logs, each once."""
     said = [
         f"Axis {view.name}: {note}"
         for view in subject.views
@@ -132,5 +132,5 @@ def notes(subject: Subject) -> list[Block]:
     for step in subject.history:
         how = "given the shape found" if step.action == "shape" else "added"
         said += [f"Axis {step.axis}, {spaced(step.effect)} {how}: {note}" for note in step.notes]
-    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in said))
+    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in (*said, *subject.doubts)))
     return [Listing(once)] if once else []

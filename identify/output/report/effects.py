@@ -78,12 +78,14 @@ def found(view: AxisView) -> list[Block]:
         rows.append(Row(("All together", *every, percent(view.found.explained), *[NOTHING] * 3)))
     titles = (
         "Effect", "Error without it", "Error with all", "Share of squared error",
-        "Of the logs that decided", "Shifted in time, at most", "Such answers right",
+        "Of what the others leave", "Shifted in time, at most", "Such answers right",
     )  # fmt: skip
     caption = (
         f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
-        "others refitted, which can stand in for it: the shares need not add up. The same force "
-        "shifted in time cannot be real. Right: of answers where the truth is known."
+        "others refitted, which can stand in for it: the shares need not add up. Of what the "
+        "others leave above the noise floor, it removes that part on the logs that chose it; the "
+        "same force shifted in time, which cannot be real, at most the next. Right: of answers as "
+        "well supported, on machines whose missing effect is known."
     )
     return [Table(titles, rows, view.words(caption))]
 
@@ -139,7 +141,7 @@ def ranking(view: AxisView) -> list[Block]:
     refitted = [c for c in view.found.ranking if c.score]
     blocks: list[Block] = [_ranked(view.found, refitted)] if refitted else []
     if others := ", ".join(spaced(c.effect.name) for c in view.found.ranking if not c.score):
-        said = f"Not refitted, as one linear step of them takes too little: {others}."
+        said = f"Not refitted, as by one linear step they gain too little: {others}."
         blocks.append(Listing([said]))
     return blocks
 
@@ -147,7 +149,7 @@ def ranking(view: AxisView) -> list[Block]:
 def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
-    scale = Scale.of(units.force, [(c.gain.before, c.gain.after) for c in found.ranking])
+    scale = Scale.of(units.force, [c.gain.before for c in refitted])
     rows = []
     for rank, c in enumerate(refitted):
         tone, part = Tone.PLAIN if c.supported else Tone.MUTED, max(c.part, 0.0)
@@ -271,15 +273,15 @@ def _named(view: AxisView) -> Iterator[tuple[Effect, AxisModel]]:
 def parameters(view: AxisView) -> list[Block]:
     """A table: with intervals where the model was fitted here."""
     if not (view.found and view.summary):
-        return [given_table(view.model)]
+        return given_table(view.model)
     found, summary, known = view.found, view.summary, {"Value": view.summary.before}
     if view.label:
         known = {f"Without {view.label}": summary.before, f"With {view.label}": summary.after}
     free, before = ({c.label for c in fit.scaling.where} for fit in (found.final, found.base))
-    return [fit_table(found.final.axis, known, summary.floor, free - before)]
+    return fit_table(found.final.axis, known, summary.floor, free - before)
 
 
-def given_table(axis: AxisModel) -> Table:
+def given_table(axis: AxisModel) -> list[Block]:
     """Values of a model that was not fitted here."""
     every, hidden = all_parameters(axis), nonparametric_labels(axis)
     rows = [
@@ -288,7 +290,7 @@ def given_table(axis: AxisModel) -> Table:
         if c.label not in hidden
     ]
     caption = "Values of the given model; twin fit adds intervals."
-    return Table(("Parameter", "Value", "Meaning"), rows, caption)
+    return [Table(("Parameter", "Value", "Meaning"), rows, caption)]
 
 
 def fit_table(
@@ -296,10 +298,10 @@ def fit_table(
     sides: Mapping[str, Sequence[Estimate]],
     floor: float,
     new: Collection[str] = (),
-) -> Table:
-    """Values of fits by their headings, with intervals. new: labels that stand out.
+) -> list[Block]:
+    """Values of fits by their headings, with intervals; nothing where curves are all there is.
 
-    floor: the one noise floor that is told, N.
+    new: labels that stand out. floor: the one noise floor that is told, N.
     """
     hidden = nonparametric_labels(axis)
     meanings = {c.label: c.parameter.meaning for c in all_parameters(axis)}
@@ -320,4 +322,4 @@ def fit_table(
         Row((*row, meanings.get(name, "")), Tone.STRONG if name in new else Tone.PLAIN)
         for name, row in cells.items()
     ]
-    return Table([*titles, "Meaning"], rows, " ".join(remarks))
+    return [Table([*titles, "Meaning"], rows, " ".join(remarks))] if rows else []

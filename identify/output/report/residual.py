@@ -26,14 +26,19 @@ def regions(view: AxisView) -> list[Block]:
     axis = view.axis
     if axis.ratio < RULE.at_floor:
         return []
-    blocks: list[Block] = [regions_table(axis)] if axis.worst else []
+    blocks: list[Block] = [regions_table(axis, of_model(view))] if axis.worst else []
     if view.found is not None and view.found.unexplained is not None:
-        blocks.append(dependence_table(view.found.unexplained, axis.maps))
+        blocks.append(dependence_table(view.found.unexplained, axis.maps, view.label))
     spectra = [m for m in axis.maps if m.coordinate == "frequency"]
     return blocks + [spectrum_chart(one, view.units) for one in spectra]
 
 
-def regions_table(axis: AxisComparison) -> Table:
+def of_model(view: AxisView) -> str:
+    """That errors are those of the model which was compared, where a better one was found."""
+    return f"Of the model without {view.label}. " if view.label else ""
+
+
+def regions_table(axis: AxisComparison, model: str) -> Table:
     """The regions whose share of the error most exceeds their share of time, in that order."""
     rows = [
         Row((
@@ -51,13 +56,13 @@ def regions_table(axis: AxisComparison) -> Table:
         "Difference",
     )  # fmt: skip
     caption = (
-        "The worst region of each coordinate, by the last column. Of a frequency band the share of "
-        "time is that of the squared force."
+        f"{model}The worst region of each coordinate, in the order of the difference of the two "
+        "shares. Of a frequency band the share of time is that of the squared force."
     )
     return Table(titles, rows, axis.units.words(caption))
 
 
-def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap]) -> Table:
+def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: str) -> Table:
     """The share of the squared error of each coordinate, the largest first."""
     units = {m.coordinate: m.unit for m in maps}
     rows = [
@@ -65,7 +70,8 @@ def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap]) -> Table
         for name, share in sorted(dependence.shares.items(), key=lambda pair: -pair[1])
         if share >= 0.005  # the least that is not printed as 0 %
     ]
-    caption = "Part of what is left that a curve over each coordinate alone accounts for."
+    beside = f" with {found}" if found else ""
+    caption = f"Part of what is left{beside} that a curve over each coordinate alone accounts for."
     return Table(("Coordinate", "Share"), rows, caption)
 
 
@@ -91,7 +97,8 @@ def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
 
 def whiteness(view: AxisView) -> list[Block]:
     """The charts of the tests of an axis, and their numbers in sentences."""
-    return residual_test_blocks(view.axis.tests, view.units)
+    said: list[Block] = [Listing([model])] if (model := of_model(view).strip()) else []
+    return said + residual_test_blocks(view.axis.tests, view.units)
 
 
 def reasons(subject: Subject) -> list[Block]:
@@ -163,11 +170,10 @@ def logs(view: AxisView) -> list[Block]:
         "Log", "Duration", words("Force error, RMS"), "Times noise floor",
         words("Position error, free run, RMS"), "Expected from noise",
     )  # fmt: skip
-    model = f"Of the model without {view.label}. " if view.label else ""
     caption = (
-        f"{model}Noise floor of the force: {quantity(axis.floor, view.units.force)} RMS with test "
-        f"functions of {quantity(axis.logs[0].test_function.length, 's')}. The free run restarts "
-        f"from the measured motion every {HORIZON:g} s; between restarts the position drifts with "
-        "every wrong force, measurement noise included."
+        f"{of_model(view)}Noise floor of the force: {quantity(axis.floor, view.units.force)} RMS "
+        f"with test functions of {quantity(axis.logs[0].test_function.length, 's')}. The free run "
+        f"restarts from the measured motion every {HORIZON:g} s; between restarts the position "
+        "drifts with every wrong force, measurement noise included."
     )
     return [Table(titles, rows, words(caption))]

@@ -23,7 +23,8 @@ from twin.model.units import AxisUnits
 class Subject:
     """The results that a report shows. history: the effects that were added to the model.
 
-    source: what the page is made of. machine: what the model says of its loop.
+    source: what the page is made of. machine: what the model says of its loop. doubts: warnings of
+    the check that the logs passed.
     """
 
     title: str
@@ -33,6 +34,7 @@ class Subject:
     additions: Sequence[Addition] = ()
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
+    doubts: Sequence[str] = ()
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:

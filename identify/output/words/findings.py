@@ -25,9 +25,9 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
     removes, control = (percent(max(p, 0.0)) for p in (finding.score.part, finding.score.control))
     said = [
         _explained(finding),
-        f"Of what is left without it, above the noise floor, it removes {removes} on the logs that "
-        f"decided; the same force shifted in time, which cannot be real, at most {control} (19 of "
-        "20 times)",
+        f"It removes {removes} of what the other effects leave above the noise floor, on the logs "
+        "that chose it; the same force shifted in time, which cannot be real, removes at most "
+        f"{control} (19 of 20 times)",
     ]
     if finding.kind is not FindingKind.WRONG_SHAPE and finding.parameters:
         units, known = finding.parameter_units, finding.parameters.items()
@@ -36,8 +36,8 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
     if finding.confidence is None:
         said.append("No confidence is stated, as the test logs do not confirm it")
     else:
-        right = f"{percent(finding.confidence)} of answers that remove so much as surely were right"
-        said.append(f"{right} where the truth is known")
+        right = f"{percent(finding.confidence)} of answers as well supported as this were right"
+        said.append(f"{right}, on machines whose missing effect is known")
     return tuple(words(text) for text in said)
 
 

@@ -46,9 +46,10 @@ HELD_OUT_GREW = (
 )
 
 
-def over_floor(error: float, floor: float, unit: str) -> str:
-    """E.g. "noise floor 12.7 mN (ratio 4.04)"."""
-    return f"noise floor {quantity(floor, unit)} (ratio {error / floor:.2f})"
+def over_floor(unit: str, floor: float, *errors: float) -> str:
+    """E.g. "noise floor 12.7 mN (ratio 4.04)", in the unit of the errors before it."""
+    ratio = " -> ".join(f"{error / floor:.2f}" for error in errors)
+    return f"noise floor {Scale.of(unit, errors).text(floor)} (ratio {ratio})"
 
 
 def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
@@ -57,8 +58,9 @@ def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     unit, words = fit.axis.units.force, fit.axis.units.words
     others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
     known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
-    errors = (f"on the {role.value} logs {quantity(e, unit)}" for role, e in known.items())
-    floor = over_floor(fit.error, fit.floor, unit)
+    scale = Scale.of(unit, fit.error)
+    errors = (f"on the {role.value} logs {scale.text(e)}" for role, e in known.items())
+    floor = over_floor(unit, fit.floor, fit.error)
     yield f"axis {axis}: {words('force error')} {', '.join(errors)}, {floor}"
     yield words(OUTCOMES[fit.ended])
     yield from (f"at its bound: {label}" for label in fit.at_bound)
@@ -239,7 +241,8 @@ def refit_in_words(refit: Refit) -> str | None:
     if not refit.changes:
         return None
     error = units_of(refit.unit).words("force error")
-    before, after = (quantity(e, refit.unit) for e in (refit.given, refit.refitted))
+    before, after = change(refit.given, refit.refitted, refit.unit)
+    before += after[after.index(" ") :]
     changes = ", ".join(map(change_in_words, refit.changes))
     return f"with the given values the {error} is {before}, after the fit {after}: {changes}"
 

@@ -12,10 +12,16 @@ from twin.model.units import units_of
 
 
 def region_in_words(region: Region) -> str:
-    """E.g. "position between 12.3 and 25.7 mm: 121 mN RMS, 14.3 times the noise floor, ..."."""
+    """E.g. "moving backwards: 121 mN RMS, 14.3 times the noise floor, 37 % of the ...".
+
+    Beside the share of the error that of the time, or of a band that of the squared force: regions
+    are in the order of the difference.
+    """
     rms, share = quantity(region.rms, region.force_unit), percent(region.share)
     over = f"{number(region.ratio)} times the noise floor"
-    return f"{place_in_words(region)}: {rms} RMS, {over}, {share} of the squared error"
+    of = "squared force" if region.coordinate == "frequency" else "time"
+    part = f"{share} of the squared error in {percent(region.visited)} of the {of}"
+    return f"{place_in_words(region)}: {rms} RMS, {over}, {part}"
 
 
 def worst_in_words(region: Region) -> str:
@@ -78,13 +84,15 @@ LOOPS = {
 
 
 def correlation_in_words(correlation: Correlation) -> str:
-    """E.g. "force residual against command: 12 % of the lags beyond the 90 % bounds, ..."."""
-    other = "its own past" if correlation.signal == "residual" else correlation.signal
-    reach = f"±{correlation.limit:.2g} that chance can reach"
+    """E.g. "correlation of the force residual with command: 12 % of the lags exceed ..."."""
+    what = "autocorrelation of the force residual"
+    if correlation.signal != "residual":
+        what = f"correlation of the force residual with {correlation.signal}"
     said = (
-        f"force residual against {other}: {percent(correlation.outside)} of the lags beyond the "
-        f"90 % bounds of ±{correlation.bound:.2g}"
+        f"{what}: {percent(correlation.outside)} of the lags exceed the 90 % bounds of "
+        f"±{correlation.bound:.2g} (of noise 10 %)"
     )
+    reach = f"exceeds ±{correlation.limit:.2g}, the most that noise reaches"
     if correlation.passes:
-        return f"{said}, none beyond the {reach}"
-    return f"{said}, some beyond the {reach}, so the residual is not noise"
+        return f"{said}, none {reach}"
+    return f"{said}, and the largest {reach}: the residual is not noise"

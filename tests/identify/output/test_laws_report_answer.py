@@ -75,7 +75,7 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     where = region_in_words(made.LEFT_OVER)
     assert card.sentence.endswith(f"It is largest at {where}.")
     assert [r.split(" explains ")[0] for r in card.remarks[:2]] == ["Cogging", "Lugre"]
-    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. Of what is left"
+    told = "without it the error on the selection logs is 7.17 N, with it 2.19 N. It removes 81 %"
     assert told in card.remarks[0]
     assert card.remarks[2].startswith("Together they explain 98 % of the squared error above")
 
@@ -170,7 +170,7 @@ def test_notes_are_said_once():
     assert listing.items.count("Axis x, cogging added: mass moved.") == 1
     told = [i for i in listing.items if i.startswith("Axis x: ")]
     expected = remarks_on(made.diagnosed(), "x")
-    assert "after the fit 127 mN" in expected[0]
+    assert "after the fit 0.127 N" in expected[0]
     assert told == [f"Axis x: {r.removesuffix('.')}." for r in expected]
     assert notes(subject_of(history=())) == []
     refused = replace(made.diagnosed(), next_experiments={}, not_planned={"x": "no travel"})

@@ -11,7 +11,8 @@ from report_cases import page_of, subject_of
 from identify.estimation.intervals import NotExcited, refusal
 from identify.output.numbers import number, title_case
 from identify.output.report.effects import given_table, growth_table, values_of
-from identify.output.report.residual import logs
+from identify.output.report.page import Listing
+from identify.output.report.residual import logs, whiteness
 from identify.output.words.fit import no_interval_in_words
 
 
@@ -53,6 +54,16 @@ def test_the_ledger_has_the_unit_of_its_largest_error():
     assert table.numeric == [False] + 6 * [True]
     assert growth_table(rising, {}).numeric == [False] + 4 * [True]
     assert logs(subject_of().views[0])[0].numeric == [False] + 5 * [True]
+
+
+def test_errors_of_the_model_before_are_told_as_such():
+    diagnosed, compared = subject_of(made.diagnosed()), subject_of()
+    for section in ("regions", "logs"):
+        assert "Of the model without all that was" in page_of(diagnosed).texts[section]
+        assert "Of the model" not in page_of(compared).texts[section]
+    first, unlabelled = (whiteness(subject.views[0])[0] for subject in (diagnosed, compared))
+    assert first == Listing(["Of the model without all that was found."])
+    assert unlabelled != first
 
 
 def test_errors_log_by_log():
@@ -146,5 +157,5 @@ def test_values_as_given():
     assert values["coulomb_viscous.sigma2"] == viscous
     assert text.table("parameters", 1)["mass"]["Value"] == "7.90 kg"
     described = axis_of(fitted("empirical_map"))
-    rows = given_table(described).rows
+    rows = given_table(described)[0].rows
     assert len(rows) == 4 + 163 - len(CATALOGUE["empirical_map"].strengths)

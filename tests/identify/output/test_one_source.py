@@ -205,6 +205,8 @@ def test_each_result_shows_what_its_text_says(case: Case) -> None:
     assert "coulomb_viscous.Fc" in text
     assert "No interval: the force error" in text
     assert "5.23 to 5.47" in shown(made.fit_result())
+    curves = replace(made.fit_result(), estimates=dict.fromkeys(made.fit_result().fits, ()))
+    assert "5.23" not in shown(curves)  # of curves alone there is no table
 
 
 def test_the_residual_is_drawn_over_the_coordinate_of_the_answer_or_any_other(case: Case) -> None:

@@ -97,8 +97,10 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
 ) -> None:
     write_log(case.fit["run 1"], tmp_path / "run 1")
     source = Source("twin diagnose drive.toml 'run 1'", "drive.toml", tmp_path)
-    faults = ["run 1: error: a gap"]
-    text = Outline(case.write(tmp_path / "r.html", source=source, faults=faults)).text
+    faults, doubts = ["run 1: error: a gap"], ["run 2: warning: the clock jitters"]
+    page = case.write(tmp_path / "r.html", source=source, faults=faults, doubts=doubts)
+    text = Outline(page).text
+    assert text.index("Axis x: cogging") < text.rindex("Notes") < text.index(doubts[0])
     assert text.index("Fault") < text.index("run 1: error: a gap") < text.index("Axis x: cogging")
     assert hashlib.sha256((tmp_path / "run 1").read_bytes()).hexdigest() in text
     assert "run 2, sha256given in memory, not as a file" in text
