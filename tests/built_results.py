@@ -40,7 +40,6 @@ RNG = np.random.default_rng(9)
 def estimates(offset: float) -> tuple[Estimate, ...]:
     """Free with an interval, free without one, and held."""
     o = offset
-    place = 0.0123 + o, 0.0257 + o
     return (
         Estimate("mass", 5.31 + o, "kg", 5.23 + o, 5.47 + o, True),
         Estimate("cogging.p", 0.0241 + o, "m", None, None, True, NotExcited()),
@@ -168,6 +167,7 @@ def whiteness_of(o: float = 0.0) -> ResidualTests:
 def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
     residual = np.concatenate([RNG.standard_normal(len(w)) for w in DATASET.fit])
     position = np.linspace(-0.031, 0.047, len(residual))
+    place = 0.0123 + o, 0.0257 + o
     return AxisComparison(
         axis=axis,
         force_error={"run 1": 0.0517 + o, "run 2": 0.0731 + o},
