@@ -60,13 +60,14 @@ def demo(
     catalogue: Catalogue,
     folder: Path,
     seed: int,
+    source: Source,
     say: Callable[[str], None] = print,
     progress: Progress = silent,
 ) -> Demo:
     """Make a machine with a hidden effect, log it, and diagnose the logs.
 
-    Writes machine_*.mcap, better.toml and report.html into the folder. Raises InputError where the
-    folder cannot be made.
+    Writes machine_*.mcap, better.toml and report.html into the folder. source: of the report.
+    Raises InputError where the folder cannot be made.
     """
     require_seed(seed)
     make_folder(folder)
@@ -76,11 +77,11 @@ def demo(
     logs: dict[str, Log] = {}
     for i, experiment in enumerate((*TRAINING, SELECTION, TEST), start=1):
         path = folder / f"machine_{i}.mcap"
-        logs[path.name] = simulate(
+        logs[str(path)] = simulate(
             machine, experiment, seed=seed + 1000 * i, duration=DURATION,
             progress=partial(progress, f"simulating {path.name}"),
         )  # fmt: skip
-        write_log(logs[path.name], path)
+        write_log(logs[str(path)], path)
     test, held = dict([logs.popitem()]), dict([logs.popitem()])
     known = ", ".join(next(iter(model.axes.values())).names)
     say(f"2. the model ({known}) is fitted, and every absent effect tried")
@@ -106,7 +107,7 @@ def demo(
         diagnosis.comparison,
         final.history,
         [addition] if addition else [],
-        Source(f"twin demo -o {folder} --seed {seed}", model.name, folder),
+        source,
         OnMachine(worth=worth),
     )
     write_report(report, subject)

@@ -431,7 +431,8 @@ def demo(
     machine, catalogue = loaded(model, effects)
     line = partial(print, file=sys.stderr if ctx.params["as_json"] else sys.stdout, flush=True)
     with progress_on_stderr() as progress:
-        result = run(machine, catalogue, folder, seed, line, progress)
+        source = _source(model, None, effects)
+        result = run(machine, catalogue, folder, seed, source, line, progress)
     hidden = result.hidden.effect.name
     answer = DemoAnswer.of(
         result,

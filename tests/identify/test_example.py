@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -109,7 +110,13 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     assert f"{step.test_error_before / step.test_error_after:.0f} times" in done.stderr
     tracked = told["feedforward"]["axes"]["x"]
     assert tracked["diagnosed"]["rms"] < tracked["before"]["rms"] < tracked["without"]["rms"]
-    assert (tmp_path / told["report"]).read_text(encoding="utf-8").count("<section") > 3
+    page = (tmp_path / told["report"]).read_text(encoding="utf-8")
+    assert page.count("<section") > 3
+    typed = re.sub("<.*?>", "", page[page.index("<code>") : page.index("</code>")])
+    assert typed.startswith(f"twin add {hidden} m.toml new/machine_1.mcap new/machine_2.mcap ")
+    opened = re.search(r'"against": *"(\w+)"', page)
+    assert opened
+    assert (opened[1] == "time") is (hidden == "periodic_disturbance")
     assert "cannot be made" in refusal(*asked[:1], "-o", "m.toml/in", folder=tmp_path)
 
 

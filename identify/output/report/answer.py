@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identify.dataset.dataset import Role
 from identify.links import WrongBody
-from identify.output.numbers import arrow, capitalised, number, quantity, spaced
+from identify.output.numbers import Scale, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.body import body_in_words
@@ -82,8 +82,9 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
         Tile(view.words(f"Force error, {on}"), _fall(*pair, unit), remark)
         for on, pair in errors.items()
     ]
-    ratio, of = _fall(base.error / floor, final.error / floor, "1"), f"{quantity(floor, unit)} RMS"
-    tiles.append(Tile("Error over noise floor", ratio, f"training logs; floor {of}"))
+    ratio, noise = _fall(base.error / floor, final.error / floor, "1"), Scale.of(unit, base.error)
+    of = f"training logs; floor {noise.text(floor)} RMS"
+    tiles.append(Tile("Error over noise floor", ratio, of))
     return [*tiles, *_position_tile(view, f", without {view.label}" if view.label else "")]
 
 

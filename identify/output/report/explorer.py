@@ -123,6 +123,8 @@ def _of_effect(effect: Effect) -> str:
     """The coordinate that the force of an effect is a curve over; "" where it is none."""
     if any(p.period for p in effect.parameters):
         return f"{effect.name}_phase"
+    if effect.reads("TIME"):
+        return "time"
     over = next((curve.over for curve in effect.curves), None)
     return "" if over is None else {Coordinate.SPEED: "velocity"}.get(over, over.value)
 
