@@ -39,7 +39,8 @@ def simulate(
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
     setpoints: Annotated[
-        Path | None, typer.Option(help="Setpoints to write as CSV, to be run on a machine.")
+        Path | None,
+        typer.Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2)."),
     ] = None,
     effects: Effects = None,
 ) -> Said:
@@ -167,15 +168,28 @@ def new(
 
 
 @app.command()
-def info(logs: Logs) -> Said:
+def info(
+    logs: Logs,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Its signals as a table: .csv, .mat, .parquet."),
+    ] = None,
+) -> Said:
     """Tell what is in logs: length, rate, axes, signals with units and ranges, and faults.
 
-    Example: twin info fit.mcap
+    Example: twin info fit.mcap -o fit.csv
     """
     from identify.output.answers.machine import info_answer
     from identify.output.machine import info_text
     from twin.checks.long import log_info
 
+    if out is not None:
+        from twin.importers.export import write_table
+        from twin.logs import read_log
+
+        if len(logs) > 1:
+            raise InputError(f"-o {out}: a table is of one log; give the logs one by one")
+        write_table(read_log(logs[0]), out)
     found = {str(path): log_info(path) for path in logs}
     return Said(info_text(found), info_answer(found))
 

@@ -75,6 +75,32 @@ def test_a_file_that_a_log_carries_is_told_by_its_length(rotary, tmp_path) -> No
     assert said.splitlines()[1] == "  written by: import_map (2 lines)"
 
 
+@pytest.mark.parametrize("ending", ["csv", "mat", "parquet"])
+def test_the_signals_of_a_log_go_to_other_tools_and_come_back(ending, rotary, tmp_path) -> None:
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    whole = read_log(rotary)
+    assert [*whole.table()] == ["time [s]", "a position [rad]", "a current [A]"]
+    done = cli_runs.twin("info", rotary, "-o", f"a.{ending}", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    name = "a_position" if ending == "mat" else "a position [rad]"
+    (tmp_path / "map.toml").write_text(
+        f'sample_rate = 1000.0\n[axes.a]\nposition = {{column = "{name}", unit = "rad"}}\n'
+        f'current = {{column = "{name.replace("position", "current").replace("rad", "A")}", '
+        'unit = "A"}\nforce_constant = 0.25 # N m/A\n'
+    )
+    back = twin.import_log(tmp_path / f"a.{ending}", twin.load_mapping(tmp_path / "map.toml"))
+    for signal, column in whole.axes["a"].columns.items():
+        np.testing.assert_allclose(back.axes["a"].columns[signal], column, atol=1e-11)
+
+
+def test_a_table_is_of_one_log_and_of_a_known_ending(rotary, tmp_path) -> None:
+    for given in ((rotary, "-o", "a.xls"), (rotary, rotary, "-o", "a.csv")):
+        said = cli_runs.refusal("info", *given, folder=tmp_path)
+        assert "a table is" in said
+    assert not [*tmp_path.glob("a.*")]
+
+
 def test_faults_are_one_line_and_a_file_that_is_no_log_too(tmp_path) -> None:
     t = 1e-3 * np.arange(3000)
     columns = {"position": np.zeros(3000), "force": np.cos(t)}

@@ -27,6 +27,7 @@ from twin.numbers import is_number
 SUFFIX = ".toml"
 ENDING = ".setpoints.csv"
 ROWS = 100_000  # of a CSV, made at once: some 10 MB
+POINTS = 0.01  # s, between the points of a trajectory, which a controller joins by smooth curves
 
 
 def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits = LINEAR) -> str:
@@ -129,9 +130,13 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
     """Write time, position, velocity and acceleration of each axis, units in the header.
 
     An experiment that adds a force has a column for it. In closed loop the position is followed;
-    in open loop the force alone drives the axis. Raises InputError where it cannot be written.
+    in open loop the force alone drives the axis. A .yaml file is a ROS 2 trajectory instead
+    (trajectory_msgs/JointTrajectory). Raises InputError where it cannot be written.
     """
     setpoint = setpoint_of(experiment, model, seed)
+    if path.suffix == ".yaml":
+        write_atomically(path, _trajectory(setpoint, [*model.axes], path).encode())
+        return
     forces = setpoint.force if isinstance(setpoint, Setpoint) else np.zeros((1, len(model.axes)))
     driven = np.flatnonzero(forces.any(axis=0))
     names = ["time [s]"]
@@ -149,3 +154,21 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
                 own = part.columns if i in driven else part.columns[:3]
                 columns += [column[:, i] for column in own]
             np.savetxt(stream, np.column_stack(columns), fmt="%.9g", delimiter=",")
+
+
+def _trajectory(setpoint: AnySetpoint, joints: list[str], path: Path) -> str:
+    """The message as YAML, a point a line. Raises InputError where a force is asked for."""
+    whole = setpoint.part(0, len(setpoint))
+    position, velocity, acceleration, force = whole.columns
+    if force.any():
+        raise InputError(f"{path}: a trajectory has no force, which drives this; give a .csv")
+    step, last = max(round(POINTS * whole.sample_rate), 1), len(whole) - 1
+    lines = []
+    for k in [*range(0, last, step), last]:
+        motion = {"positions": position, "velocities": velocity, "accelerations": acceleration}
+        values = (f"{name}: [{', '.join(f'{v:.9f}' for v in x[k])}]" for name, x in motion.items())
+        seconds, rest = divmod(round(1e9 * k / whole.sample_rate), 10**9)
+        lines.append(
+            f"- {{time_from_start: {{sec: {seconds}, nanosec: {rest}}}, {', '.join(values)}}}\n"
+        )
+    return f"joint_names: [{', '.join(joints)}]\npoints:\n{''.join(lines)}"

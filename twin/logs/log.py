@@ -108,6 +108,15 @@ class Log:
         extent = f"{len(self) * self.period:.4g} s at {self.sample_rate:g} Hz"
         return f"<p>{extent}</p>\n<table>\n<tr>{titles}</tr>\n{rows}</table>"
 
+    def table(self) -> dict[str, Array]:
+        """Columns (n,) by signal and unit, as "x position [m]", the time first; for pandas, say."""
+        signals = {
+            f"{name} {signal} [{axis.units[signal]}]": column
+            for name, axis in self.axes.items()
+            for signal, column in axis.columns.items()
+        }
+        return {"time [s]": self.time, **signals}
+
     def part(self, first: int, stop: int) -> Log:
         """Its samples from number ``first`` to before ``stop``."""
         return self.changed(lambda name, column: column[first:stop])

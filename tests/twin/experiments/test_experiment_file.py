@@ -1,5 +1,6 @@
 """Experiment files, setpoints as CSV, and what the commands refuse of them."""
 
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -133,6 +134,27 @@ def test_the_table_is_the_setpoint_of_the_simulation_of_that_seed(experiment, se
         for name, unit in (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
             wanted = own.columns[f"setpoint_{name}"]
             np.testing.assert_allclose(table[f"{axis} {name} [{unit}]"][:n], wanted, atol=1e-8)
+
+
+def test_a_trajectory_of_ros_2_has_the_points_of_the_table(tmp_path):
+    experiment = Moves(2, duration=1.003)
+    for ending in ("csv", "yaml"):
+        write_setpoints(experiment, PROTON, 3, tmp_path / f"s.{ending}")
+    table, text = read(tmp_path / "s.csv"), (tmp_path / "s.yaml").read_text()
+    joints, key, *points = text.splitlines()
+    assert (joints, key) == ("joint_names: [x, y]", "points:")
+    times = re.findall(r"{sec: (\d+), nanosec: (\d+)}", text)
+    at = np.array([int(sec) + 1e-9 * int(rest) for sec, rest in times])
+    assert len(at) == len(points)
+    np.testing.assert_allclose(np.diff(at)[:-1], 0.01)
+    assert at[-1] == pytest.approx(table["time [s]"][-1])
+    for name, plural in (("position [m]", "positions"), ("acceleration [m/s^2]", "accelerations")):
+        values = re.findall(rf"{plural}: \[([-\d.]+), ([-\d.]+)\]", text)
+        for axis, own in zip("xy", np.array(values, dtype=float).T, strict=True):
+            wanted = np.interp(at, table["time [s]"], table[f"{axis} {name}"])
+            np.testing.assert_allclose(own, wanted, atol=1e-8)
+    with pytest.raises(InputError, match="has no force"):
+        write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / "f.yaml")
 
 
 def test_a_force_has_a_column_of_its_own(tmp_path):
