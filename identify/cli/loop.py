@@ -145,7 +145,7 @@ def diagnose(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
-    result, findings, silent = with_logs(job, machine, logs, holdout, test)
+    result, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
     source = _source(model, test_function, effects)
     if html:
         title = f"{machine.name}: what the model lacks"

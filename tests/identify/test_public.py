@@ -113,19 +113,19 @@ def scaled(log: Log, field: str, factor: float) -> Log:
     ("field", "factor", "said"),
     [("force", -1.0, "one of them is reversed"), ("position", 1e3, "unit")],
 )
-def test_a_reversed_force_or_a_wrong_unit_writes_no_model(log, tmp_path, field, factor, said):
+def test_a_reversed_force_or_a_wrong_unit_writes_nothing(log, tmp_path, field, factor, said):
     wrong = scaled(log, field, factor)
     write_log(wrong, tmp_path / "wrong.mcap")
-    for command in (("fit",), ("add", "cogging")):
-        done = cli_runs.twin(
-            *command, "proton_xy", "wrong.mcap", "-o", "m.toml", "--json", folder=tmp_path
-        )
+    for command in ("fit", "add cogging", "diagnose"):
+        out = "m.html" if command == "diagnose" else "m.toml"
+        given = ("proton_xy", "wrong.mcap", "-o", out, "--json")
+        done = cli_runs.twin(*command.split(), *given, folder=tmp_path)
         assert done.returncode == 2
         error = json.loads(done.stdout)["error"]
         assert error.startswith("wrong.mcap: axis x")
         assert said in error
         assert "; nothing is fitted to it" in error
-        assert not (tmp_path / "m.toml").exists()
+        assert not (tmp_path / out).exists()
 
 
 def disagreements(after: AxisModel) -> list[str]:

@@ -136,9 +136,9 @@ def check_units(effect: Effect) -> None:
             if not off <= ALIKE * size:
                 told = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters[:6])
                 raise LawBroken(
-                    "in other units of force, length and time its result is another "
-                    f"({off / size:.2g} of it apart): check the units of its parameters ({told}), "
-                    "and numbers in the law that have a unit of their own"
+                    "in other units of force, length and time its result differs, by "
+                    f"{off / size:.2g} times what it should be: check the units of its parameters "
+                    f"({told}), and numbers in the law that have a unit of their own"
                 )
 
 
