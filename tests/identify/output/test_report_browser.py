@@ -108,7 +108,7 @@ def test_any_signal_is_shown_over_any_coordinate(page: Browser) -> None:
     assert labels[0][0].startswith("Cogging phase (")
     assert labels[0][1].startswith("Unexplained force (")
     assert labels[1][0].startswith("Speed (mm/s")
-    assert labels[2][0] == "Time, logs in a row (s)"
+    assert labels[2][0] == "Time, log after log (s)"
     assert [s[2] for s in seen] == [3, 3, 3, 2, 3]  # the coordinate, and a mean for each
     assert seen[3][3] == pytest.approx(100.0, rel=0.05)  # mN of cogging, over one period
     # The largest residual is inside the picture.

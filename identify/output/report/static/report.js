@@ -168,7 +168,7 @@ if (data.length) {
   function motion(common, hooks) {
     const against = $("against").value;  // a phase turns too often to be read over time
     const name = against === "time" || against.endsWith("_phase") ? "position" : against, s = axis.of(name);
-    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), logs in a row", s.unit || "1"],
+    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), log after log", s.unit || "1"],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
   }
@@ -219,7 +219,7 @@ if (data.length) {
 
   function coordinate() {
     const what = $("show").value, against = $("against").value, [a, b, where] = part();
-    const x = against === "time" ? axis.x : axis.values(against), along = against === "time" ? {label: "Time, logs in a row", unit: "s"} : axis.of(against);
+    const x = against === "time" ? axis.x : axis.values(against), along = against === "time" ? {label: "Time, log after log", unit: "s"} : axis.of(against);
     const group = what === "residual" ? axis.residuals.map((n, i) => [n, [BEFORE, AFTER][i]])
       : what === "force" ? series().slice(0, series().length - axis.effects.length) : series().filter(s => s[0] === what);
     const unit = axis.of(what === "residual" ? "before" : "to_explain").unit;
