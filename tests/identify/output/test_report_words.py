@@ -145,7 +145,7 @@ def test_a_thinned_log_is_told_with_what_to_log_instead(folded: float, told: boo
 def test_an_experiment_in_short_has_the_units_of_its_parameters() -> None:
     rests = Rests("y", 0.0021, 0.0043, (0.1, 0.75), effort=0.25)
     assert in_short(rests) == (
-        "rests: axis y, effort 0.25 1, span 0.0021 m, speed 0.0043 m/s, rests 0.1 0.75 s"
+        "rests: axis y, effort 0.25, span 0.0021 m, speed 0.0043 m/s, rests 0.1 0.75 s"
     )
 
 

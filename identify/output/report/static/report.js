@@ -117,7 +117,7 @@ if (data.length) {
     range = null;
     choices("axis", axes.map(a => [a.name, a.name]), name);
     choices("show", [["residual", axis.texts.residual], ["force", axis.texts.force], ...names(axis.effects)], "residual");
-    choices("against", [["time", "time"], ...names(axis.coordinates)], axis.against);
+    choices("against", [["time", "Time"], ...names(axis.coordinates)], axis.against);
     choices("log", [["", "all logs"], ...axis.logs.map((log, i) => [String(i), log.title])], "");
     const second = axis.coordinates.find(c => c !== axis.against && c === (axis.against === "velocity" ? "position" : "velocity"));
     choices("map-x", names(axis.coordinates), axis.against === "time" ? "position" : axis.against);
