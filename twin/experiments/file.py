@@ -39,7 +39,7 @@ def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits =
     table["kind"] = tomlkit.item(kind_of(experiment)).comment(experiment.summary)
     metadata = {f.name: f.metadata for f in fields(experiment)}
     for name, value in parameters(experiment).items():
-        about = (_unit(metadata[name], units), metadata[name].get("meaning"))
+        about = (units(metadata[name].get("unit", "")), metadata[name].get("meaning"))
         item = tomlkit.item(list(value) if isinstance(value, tuple) else value)
         table[name] = item.comment(", ".join(filter(None, about))) if any(about) else item
     document["experiment"] = table
@@ -110,15 +110,10 @@ def _known(name: object, known: Mapping[str, Any]) -> str:
 
 def in_short(experiment: Experiment, units_of: AxisUnits = LINEAR) -> str:
     """Kind and parameters with the units of the axis that it drives, on one line."""
-    units = {f.name: _unit(f.metadata, units_of) for f in fields(experiment)}
+    units = {f.name: units_of(f.metadata.get("unit", "")) for f in fields(experiment)}
+    units = {name: "" if unit == "1" else unit for name, unit in units.items()}  # of a part: none
     values = (f"{k} {_plain(v)} {units[k]}".strip() for k, v in parameters(experiment).items())
     return f"{kind_of(experiment)}: {', '.join(values)}"
-
-
-def _unit(metadata: Mapping[str, Any], units: AxisUnits) -> str:
-    """The unit of a parameter on an axis; a part of a limit has none."""
-    unit = units(metadata.get("unit", ""))
-    return "" if unit == "1" else unit
 
 
 def _plain(value: object) -> str:
