@@ -190,6 +190,10 @@ def signals_of(names: Sequence[str], columns: Columns, step: float) -> dict[str,
         found["position"] = Signal(position, unit_in(position), why)
         found.setdefault("velocity", Signal(velocity, unit_in(velocity), f"the rate of {position}"))
         left = [n for n in left if n not in pair]
+    if "position" not in found and (driven := _driven(columns, left, step)):
+        position, why = driven
+        found["position"] = Signal(position, unit_in(position), why)
+        left.remove(position)
     if "position" not in found:
         return found
     left = _with_setpoints(found, left, columns, step)
@@ -209,6 +213,26 @@ def _moved(columns: Columns, names: Sequence[str], step: float) -> Pair | None:
         return pair
     alike = leaders(columns, others, means(columns[pair[0]], step), step)
     return other if other[0] in {one.name for one in alike if one.ahead < 0.0} else pair
+
+
+def _driven(columns: Columns, names: Sequence[str], step: float) -> tuple[str, str] | None:
+    """The position whose motion explains another column as its force, and why it is taken for it.
+
+    Of columns of one course the roughest is measured, and the others are its setpoints.
+    """
+    best: tuple[float, str, list[str]] = (_RATE, "", [])
+    for name in names:
+        course = leaders(columns, [n for n in names if n != name], means(columns[name], step), step)
+        alike = [name, *(leader.name for leader in course)]
+        moved = moved_by(columns, [n for n in names if n not in alike], columns[name], step)
+        if moved and moved[1] > best[0]:
+            as_large = [leader.name for leader in course if _unit_of(leader, "m")]
+            best = moved[1], moved[0], [name, *as_large]
+    share, force, alike = best
+    if not alike:
+        return None
+    position = max(alike, key=lambda n: float(np.std(np.diff(columns[n], 2)) / np.std(columns[n])))
+    return position, f"its motion explains {100.0 * share:.0f} % of {force}"
 
 
 def _with_setpoints(

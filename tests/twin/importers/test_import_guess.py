@@ -47,6 +47,8 @@ def columns_of(folder: Path, text: str) -> dict[str, dict[str, str]]:
           "y": {"position": "yPos_mm", "current": "yCurrent_A"}}, 1000.0),
         ({"one": T, "two": NOISE, "three": V, "four": Q, "five": F},
          {"x": {"position": "four", "velocity": "three", "force": "five"}}, 1000.0),
+        ({"one": T, "two": F, "three": NOISE, "four": Q},
+         {"x": {"position": "four", "force": "two"}}, 1000.0),
     ],
 )  # fmt: skip
 def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, rate):
@@ -68,6 +70,7 @@ def trailing(column, samples=25):
 
 GOAL, RATE_OF_GOAL, REACHED, SPEED = Q, V, trailing(Q), trailing(V)
 PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
+MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
 
 
 @pytest.mark.parametrize(
@@ -79,6 +82,8 @@ PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
         ({"a": T, "b": GOAL, "c": RATE_OF_GOAL, "d": REACHED, "e": SPEED, "f": PUSH},
          {"position": "d", "velocity": "e", "setpoint_position": "b", "setpoint_velocity": "c",
           "force": "f"}, "setpoint_velocity"),
+        ({"a": T, "b": GOAL, "c": REACHED, "d": MOVES_A_MASS},
+         {"position": "c", "setpoint_position": "b", "force": "d"}, "explains 97 % of d"),
         ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
          {"position": "angle", "setpoint_position": "u", "force": "w"}, 'unit = "deg"'),
         ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
@@ -93,6 +98,13 @@ def test_what_follows_the_position_is_its_setpoint_and_no_force(tmp_path, column
     assert not found.missing
     assert columns_of(tmp_path, found.text) == {"x": expected}
     assert told in found.text
+
+
+def test_a_table_may_have_neither_names_nor_a_velocity(tmp_path):
+    table = np.column_stack([T, GOAL, REACHED, MOVES_A_MASS])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",")
+    found = columns_of(tmp_path, guess_map(tmp_path / "a.csv").text)
+    assert found == {"x": {"position": "3", "setpoint_position": "2", "force": "4"}}
 
 
 def test_a_setpoint_alone_is_no_force(tmp_path):
