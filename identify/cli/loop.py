@@ -184,7 +184,15 @@ def _report(
     history = (diagnosis or comparison).model.history
     write_report(
         out,
-        Subject(title, diagnosis, comparison, history, (), source, known, minor(findings)),
+        Subject(
+            title,
+            diagnosis,
+            comparison,
+            history,
+            source=source,
+            machine=known,
+            doubts=minor(findings),
+        ),  # fmt: skip
         assumed=[line for line in findings if ASSUMES in line],
         faults=[line for line in findings if ": error: " in line],
     )
