@@ -182,17 +182,10 @@ def _report(
     from identify.output.report.subject import Subject
 
     history = (diagnosis or comparison).model.history
+    subject = Subject(title, diagnosis, comparison, history, source=source, machine=known)
     write_report(
         out,
-        Subject(
-            title,
-            diagnosis,
-            comparison,
-            history,
-            source=source,
-            machine=known,
-            doubts=minor(findings),
-        ),  # fmt: skip
+        replace(subject, doubts=minor(findings)),
         assumed=[line for line in findings if ASSUMES in line],
         faults=[line for line in findings if ": error: " in line],
     )
