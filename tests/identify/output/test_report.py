@@ -67,10 +67,8 @@ def test_what_is_named_is_shown_with_what_it_gains_as_feedforward(case: Case, tm
     page = case.write(tmp_path / "w.html", machine=known)
     found = known.worth.axes["x"]
     shown = page[page.index('<section id="worth"') :].partition("</section>")[0]
-    assert (
-        f"all but cogging fed forward, the RMS error is {typeset(quantity(found.gains['cogging'], 'm'))}"
-        in shown
-    )
+    gain = typeset(quantity(found.gains["cogging"], "m"))
+    assert f"all but cogging fed forward, the RMS error is {gain} larger" in shown
     for error in (found.without, found.before, found.diagnosed):
         assert typeset(quantity(error.rms, "m")) in shown
     assert on_machine(after, case.held).worth is None  # nothing was found: nothing is gained
