@@ -31,10 +31,10 @@ from identify.output.words.fit import (
     over_floor,
 )
 from identify.output.words.plan import (
+    all_not_run_in_words,
     experiment_in_words,
     gap_in_words,
     in_order,
-    not_run_in_words,
     question_in_words,
     supposed_in_words,
 )
@@ -198,7 +198,7 @@ def plan_text(result: Plan) -> str:
         favoured and f"the existing logs already favour {favoured}",
         supposed_in_words(result),
         *(experiment_in_words(t, result) for t in in_order(result)[:SHOWN]),
-        *(f"not run: {not_run_in_words(n)}" for n in result.not_run),
+        *(f"not run: {why}" for why in all_not_run_in_words(result.not_run)),
     ]
     first = f"axis {result.axis}: {question_in_words(result)}"
     return "\n".join([first, *(f"  {line}" for line in lines if line)])

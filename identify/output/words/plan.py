@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
@@ -88,5 +91,24 @@ def gap_in_words(gap: Gap) -> str:
 
 def not_run_in_words(not_run: NotRun) -> str:
     """Which experiment cannot be run, and why."""
-    truth = f" (with {not_run.truth})" if not_run.truth else ""
-    return f"{in_short(not_run.experiment, not_run.units)}: {not_run.reason}{truth}"
+    return f"{in_short(not_run.experiment, not_run.units)}: {_why(not_run)}"
+
+
+def _why(not_run: NotRun) -> str:
+    return f"{not_run.reason} (with {not_run.truth})" if not_run.truth else not_run.reason
+
+
+def all_not_run_in_words(not_run: Sequence[NotRun]) -> list[str]:
+    """The same of several; those of one reason together, by how many there are of each kind."""
+    alike: dict[str, list[NotRun]] = {}
+    for one in not_run:
+        alike.setdefault(_why(one), []).append(one)
+
+    def kinds(same: list[NotRun]) -> str:
+        count = Counter(in_short(n.experiment, n.units).partition(":")[0] for n in same)
+        return ", ".join(f"{number} {kind}" for kind, number in count.items())
+
+    return [
+        not_run_in_words(*same) if len(same) == 1 else f"{kinds(same)}: {why}"
+        for why, same in alike.items()
+    ]
