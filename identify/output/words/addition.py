@@ -63,15 +63,17 @@ def notes_in_words(made: Addition) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if added.effect.is_nonparametric:
         notes.insert(0, nonparametric_in_words(added.fit.axis[added.effect.name]))
     if reshaped:
-        where = "beside" if reshaped in added.fit.axis.names else "in the place of"
-        notes.insert(0, f"{added.effect.name} is {where} the law of {reshaped}")
+        beside = reshaped in added.fit.axis.names
+        where = "beside" if beside else "in the place of"
+        both = "; the force is that of both, so do not read the law's values alone"
+        notes.insert(0, f"{added.effect.name} is {where} the law of {reshaped}{both * beside}")
     elif set_aside:
         notes.append(
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"
         )
-    beside = also_chose_in_words(made.told_on)
-    return tuple(notes), tuple(notes) if beside is None else (*notes, beside)
+    chose = also_chose_in_words(made.told_on)
+    return tuple(notes), tuple(notes) if chose is None else (*notes, chose)
 
 
 def also_chose_in_words(on: Role) -> str | None:
