@@ -186,8 +186,8 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
     )
     assert notes(added) == ()
     assert notes(added, step=reshaped) == (
-        "cogging is beside the law of coulomb_viscous; the force is that of both, so do not read the "
-        "law's values alone",
+        "cogging is beside the law of coulomb_viscous; the force is that of both, so do not read "
+        "the law's values alone",
     )
     replaced = replace(reshaped, effect="roller_spikes")
     instead, note = notes(added, (moved,), ("empirical_map",), replaced)
