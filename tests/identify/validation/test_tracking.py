@@ -99,7 +99,7 @@ def test_the_command_tells_what_the_call_gives(tmp_path, log) -> None:
     )
     text = twin(*arguments, folder=tmp_path).stdout
     assert "axis x: tracking error, RMS and largest" in text
-    assert "cogging gains" in text
+    assert "with all but cogging: RMS" in text
     assert "µm" in text
     assert "nowhere.toml" in refusal(*arguments[:-1], "nowhere.toml", folder=tmp_path)
 
