@@ -93,7 +93,8 @@ def score_of(part: float, t: float, control: float) -> Score:
 FOUND = (
     Finding("cogging", ("quadratic_drag",), 0.871, *errors(7.17, 2.19), "N",
             {"p": 0.0261, "a1": 0.127}, score_of(0.813, 7.7, 0.137),
-            parameter_units={"p": "m", "a1": "N"}),
+            parameter_units={"p": "m", "a1": "N"},
+            equation="F = a1 sin(2 pi x/p)"),
     Finding("lugre", (), 0.119, *errors(3.23, 2.19), "N", {"Fc": 0.31}, score_of(0.417, 4.3, 0.071),
             parameter_units={"Fc": "N"}),
 )  # fmt: skip

@@ -39,7 +39,8 @@ class Finding:
     above the noise floor that comes back when it alone is taken out, at most 1. tested: test
     errors in ``unit`` without it and with it. chosen: the same on the logs that chose; without test
     logs the test errors are these. score: the acceptance test beside the fit without it. together:
-    names of the findings without which it is not accepted. parameters, parameter_units: of its law.
+    names of the findings without which it is not accepted. parameters, parameter_units, equation:
+    of its law.
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
     that curve, where it has such a parameter. left, left_fitted: over the noise floor, the error
     that all findings together leave on the logs that chose, and on the training logs.
@@ -61,6 +62,7 @@ class Finding:
     left_fitted: float = 1.0
     doubt: str | None = None
     parameter_units: dict[str, str] = field(default_factory=dict)
+    equation: str = ""
 
     @property
     def contradicted(self) -> bool:
@@ -153,6 +155,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         unit=axis.units.force,
         parameters=dict(axis[name].values),
         parameter_units=axis.parameter_units(name),
+        equation=axis[name].effect.equation,
         score=beside,
         kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
         together=tuple(others) if any(s.with_others for s in steps) else (),

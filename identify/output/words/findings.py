@@ -32,7 +32,8 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
     if finding.kind is not FindingKind.WRONG_SHAPE and finding.parameters:
         units, known = finding.parameter_units, finding.parameters.items()
         values = ", ".join(f"{n} = {quantity(v, units.get(n, '1'))}" for n, v in known)
-        said.append(f"Found: {values}")
+        law = f", in {' '.join(finding.equation.split())}" if finding.equation else ""
+        said.append(f"Found: {values}{law}")
     if finding.confidence is None:
         said.append("No confidence is stated, as the test logs do not confirm it")
     else:
