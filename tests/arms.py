@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.experiments.trajectory import Setpoint
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 
 Array = NDArray[np.float64]
@@ -54,8 +55,12 @@ def arm_log(
     noise: float = 1e-6,
     text: str = ARM,
     change: Callable[[mujoco.MjModel], None] = lambda model: None,
+    planned: Setpoint | None = None,
 ) -> Log:
-    """The arm under a velocity loop that follows sines; noise: rad RMS of the encoders."""
+    """The arm under a velocity loop that follows sines, or a planned motion of its own rate.
+
+    noise: rad RMS of the encoders.
+    """
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.timestep = SAMPLE / STEPS
     change(model)
@@ -63,16 +68,15 @@ def arm_log(
     rate = 2.0 * np.pi * rng.uniform(0.1, 0.7, (3, 3))
     size, phase = rng.uniform(0.2, 0.5, (3, 3)), rng.uniform(0.0, 2.0 * np.pi, (3, 3))
     gain = np.array([25.0, 40.0, 8.0])
-    count = round(duration / SAMPLE)
-    position, command = np.empty((2, count, 3))
-    data.qpos[:] = (size * np.sin(phase)).sum(axis=1)
-    data.qvel[:] = (size * rate * np.cos(phase)).sum(axis=1)
-    for k in range(count):
-        at = rate * (k * SAMPLE) + phase
-        off = (size * np.sin(at)).sum(axis=1) - data.qpos
-        slow = (size * rate * np.cos(at)).sum(axis=1) - data.qvel
+    at = rate * (SAMPLE * np.arange(round(duration / SAMPLE)))[:, None, None] + phase
+    wanted, speed = (size * np.sin(at)).sum(axis=2), (size * rate * np.cos(at)).sum(axis=2)
+    if planned is not None:
+        wanted, speed = planned.position, planned.velocity
+    position, command = np.empty((2, *wanted.shape))
+    data.qpos[:], data.qvel[:] = wanted[0], speed[0]
+    for k in range(len(wanted)):
         mujoco.mj_forward(model, data)
-        torque = data.qfrc_bias + gain * (slow + 8.0 * off)
+        torque = data.qfrc_bias + gain * (speed[k] - data.qvel + 8.0 * (wanted[k] - data.qpos))
         # Its steps put the position half a step ahead of the velocity.
         position[k], command[k] = data.qpos - 0.5 * model.opt.timestep * data.qvel, torque
         for _ in range(STEPS):

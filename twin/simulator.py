@@ -14,7 +14,7 @@ from twin.core.control import Controller, gain_table
 from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
-from twin.experiments.trajectory import AnySetpoint
+from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.instability import require_sound
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import (
@@ -182,6 +182,11 @@ class ReducedSimulator:
         )  # fmt: skip
 
 
+def quickest(model: MachineModel) -> type[MujocoSimulator] | type[ReducedSimulator]:
+    """The reduced model; MuJoCo where the axes are joints, which move each other."""
+    return MujocoSimulator if model.joints else ReducedSimulator
+
+
 class FineSimulator(ReducedSimulator):
     """Point masses stepped ten times a sample under a held command: finer than any analysis."""
 
@@ -252,7 +257,8 @@ def run_parts(
         wanted = setpoint.part(first, min(first + CHUNK, n))
         noise = rng.standard_normal((len(wanted), n_axes)) * scale
         part = _empty(before, len(wanted))
-        columns = (wanted.position, wanted.velocity, wanted.acceleration, wanted.force)
+        force = wanted.force + _carried(model, wanted)
+        columns = (wanted.position, wanted.velocity, wanted.acceleration, force)
         simulation.run(first, shared, np.stack(columns, axis=2), noise, part.arrays)
         require_sound(
             np.concatenate([before.signals[-1:], part.signals]),
@@ -263,6 +269,20 @@ def run_parts(
         before = part
         if progress:
             progress(first + len(wanted), n)
+
+
+def _carried(model: MachineModel, setpoint: Setpoint) -> Array | float:
+    """Force (n, n_axes) N that joints take along a setpoint beyond mass times acceleration.
+
+    As the mass of a plain axis, the weight and the inertia of bodies are fed forward.
+    """
+    if not model.joints:
+        return 0.0
+    from twin.mujoco.mechanism import mechanism_of
+
+    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    bodies = mechanism.carried(setpoint.position.T, setpoint.acceleration.T).T
+    return bodies - mechanism.inertia * setpoint.acceleration
 
 
 def _empty(like: Run, samples: int) -> Run:

@@ -79,7 +79,7 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
     else:
         gap = 2.0 * np.median(np.abs(command))
     heard = [m.head(ENOUGH / len(motions)) for m in motions]  # what repeats does so in them too
-    force = float(np.abs(command).max())
+    force = float(max(np.abs(m.command).max() for m in motions))
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),

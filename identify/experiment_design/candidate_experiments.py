@@ -72,7 +72,7 @@ def proposals(
     others = [v.travel for name, v in limits.items() if name != axis]
     other = neat(USED * (others[0][1] - others[0][0])) if len(others) == 1 else 0.0
     effort = min(
-        1.0, FORCE_USED * own.hardware.force_limit / (own.mass * own.hardware.acceleration)
+        1.0, FORCE_USED * own.hardware.force_limit / (own.weighed.mass * own.hardware.acceleration)
     )
     limit, scale = gentle(limits[axis], effort), _scale(own)
     room = _Room(own, axis, limit, other, duration, scale, model.sample_rate)

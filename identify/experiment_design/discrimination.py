@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.drive import parts_of
-from identify.dataset.motion import SHORTEST_LOG, Motion, motion_of
+from identify.dataset.motion import SHORTEST_LOG, Motion, bodies_along, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import choose_test_function
@@ -39,7 +39,7 @@ from twin.model.units import AxisUnits
 from twin.parallel import spread
 from twin.progress import Progress, silent
 from twin.signals import Array
-from twin.simulator import ReducedSimulator
+from twin.simulator import quickest
 
 SEED = 0  # of the random moves and the noise; `twin simulate` draws the same moves by default
 
@@ -113,7 +113,7 @@ class Arena:
         hardly moves or not for long, and where it moves too slowly for the test function.
         """
         truth_machine = self.machine.with_axis(self.name, truth.axis)
-        log = simulate(truth_machine, experiment, seed=SEED, simulator=ReducedSimulator)
+        log = simulate(truth_machine, experiment, seed=SEED, simulator=quickest(self.machine))
         require_within_limits(truth_machine, log)
         if len(log) * log.period < SHORTEST_LOG or not moves(log, self.name):
             raise CannotRun(
@@ -123,7 +123,10 @@ class Arena:
         # The readings of a simulation err as the effects of the encoder make them, by nothing else.
         errs = bool(parts_of(truth.axis, Kind.SENSING).effects)
         axes = tuple(self.machine.axes)
-        motion = motion_of(log, self.name, "planned", axes, ripples=None if errs else ())
+        motion = motion_of(
+            log, self.name, "planned", axes, ripples=None if errs else (),
+            bodies=bodies_along(self.machine, log, "planned").get(self.name),
+        )  # fmt: skip
         if self.test_function is not None and self.test_function < LEAST_BLOCKS * motion.period:
             raise CannotRun(
                 f"axis {self.name} moves too slowly for a test function of {self.test_function:g} "

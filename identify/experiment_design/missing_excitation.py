@@ -58,7 +58,7 @@ def properties(log: PreparedLog) -> dict[str, Array]:
     found = (
         np.abs(mean(motion.velocity)),
         np.abs(log.acceleration),
-        np.abs(log.command),
+        np.abs(log.fine.mean(motion.raw[1])),
         np.abs(log.test_function.acceleration(motion.command)),
         mean(since_reversal(motion.velocity, motion.period)),
         np.round(mean(_rest(motion)), 1),  # as settling is gradual

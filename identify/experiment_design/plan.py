@@ -107,11 +107,6 @@ def plan(
     """
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
-    if model.joints:
-        raise CannotRun(
-            f"{model.name}: its axes are joints of {model.mjcf_name}, for which no experiment is "
-            "planned; log slow passes both ways and strong accelerations in several poses of each"
-        )
     if axis is not None:
         model.axis(axis)
     require_length(duration, model.sample_rate)
@@ -134,13 +129,13 @@ def next_experiments(
 ) -> tuple[dict[str, Plan], dict[str, str]]:
     """By axis, the experiment that decides an ambiguous diagnosis, or why the machine can run none.
 
-    Both are empty for an axis where less than two explanations are left, and for a joint of a
-    mechanism. test_function: length that the diagnosis used, s; None where chosen from the noise.
+    Both are empty for an axis where less than two explanations are left. test_function: length that
+    the diagnosis used, s; None where chosen from the noise.
     """
     plans, not_planned = {}, {}
     for axis, found in axes.items():
         rivals = _rivals(found)
-        if len(rivals) < 2 or model.joints:
+        if len(rivals) < 2:
             continue
         some = found.dataset.part  # as in a search: all of long logs would tell little more
         arena = _between_candidates(model, some, rivals, test_function)

@@ -21,7 +21,7 @@ from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
-from twin.simulator import ReducedSimulator
+from twin.simulator import quickest
 
 STRENGTH = 10.0  # times the noise floor: assumed force of an effect when there are no logs
 SIMULATED = 10.0  # s of simulated tracking on which such an effect is scaled to that force
@@ -31,7 +31,7 @@ Rival = Effect | MachineModel
 
 def simulated_dataset(machine: MachineModel, axis: str) -> Dataset:
     """A dataset of simulated random moves of the model, for use when there are no logs."""
-    log = simulate(machine, Tracking(SIMULATED), seed=0, simulator=ReducedSimulator)
+    log = simulate(machine, Tracking(SIMULATED), seed=0, simulator=quickest(machine))
     return datasets(machine, {"simulated": log}, {})[axis]
 
 

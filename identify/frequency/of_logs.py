@@ -18,7 +18,7 @@ from twin.logs.log import AxisLog
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.progress import Progress, silent
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulator import quickest
 
 NEAR = 0.1  # of a mass, to which a response of little friction tells it
 
@@ -100,11 +100,11 @@ def _moves(log: Log, name: str) -> bool:
 
 def _simulated(logs: Mapping[str, Log], model: MachineModel, progress: Progress) -> dict[str, Log]:
     """The logs that the model makes in the place of the machine, with the same setpoints."""
-    simulator = MujocoSimulator if model.joints else ReducedSimulator
     out = {}
     for i, (name, log) in enumerate(logs.items()):
         progress("simulating the model", i, len(logs))
-        out[name] = replay(replace(model, sample_rate=log.sample_rate), log, simulator=simulator)
+        sampled = replace(model, sample_rate=log.sample_rate)
+        out[name] = replay(sampled, log, simulator=quickest(model))
     return out
 
 

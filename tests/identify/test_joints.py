@@ -20,14 +20,18 @@ from identify.output.as_json import answer_of
 from identify.output.text import text_of
 from identify.selection.diagnosis import diagnose_axis
 from identify.selection.trying import try_effect
-from identify.workflow import compare, diagnose, fit
+from identify.workflow import compare, diagnose, fit, plan
 from twin.effects import Catalogue, load_catalogue
+from twin.experiments.file import setpoint_of
+from twin.experiments.kinds import Passes, Tracking, kind_of
+from twin.experiments.named import simulate
 from twin.logs import read_log, write_log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
 from twin.simulator import MujocoSimulator
 
+RIVALS = ("gravity", "spring")
 FEW = Catalogue([load_catalogue()[n] for n in ("coulomb_viscous", "rotor_inertia", "gravity")])
 NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
@@ -181,7 +185,7 @@ def test_a_model_file_that_is_wrong_is_one_line(folder, old, new, said):
     assert said in refusal("fit", "wrong.toml", "1.mcap", "-o", "fitted.toml", folder=folder)
 
 
-def test_a_log_that_lacks_a_joint_and_a_plan_for_joints_are_one_line(folder):
+def test_a_log_that_lacks_a_joint_and_a_joint_without_travel_are_one_line(folder):
     log = arm_log(1)
     del log.axes["elbow"]
     write_log(log, folder / "less.mcap")
@@ -189,8 +193,47 @@ def test_a_log_that_lacks_a_joint_and_a_plan_for_joints_are_one_line(folder):
     assert "has no axis 'elbow', which is a joint of arm.xml" in said
     said = refusal("new", "less.mcap", "--mjcf", "arm.xml", "-o", "other.toml", folder=folder)
     assert "the joints elbow are no axes" in said
-    said = refusal("plan", "arm.toml", "1.mcap", "-o", "next.toml", folder=folder)
-    assert "joints of arm.xml, for which no experiment is planned" in said
+    endless = re.sub("travel = .*", "", (folder / "arm.toml").read_text(), count=1)
+    (folder / "endless.toml").write_text(endless)
+    said = refusal("plan", "endless.toml", "--axis", "elbow", "-o", "next.toml", folder=folder)
+    assert "axis base has no travel; give travel = [low, high] in rad" in said
+
+
+def balanced(q, v):
+    """Friction, and a counterbalance of the fore arm."""
+    return friction(q, v) - [0.0, 0.0, 0.6 * np.sin(q[2] + 0.3)]
+
+
+def test_the_planned_experiment_tells_apart_what_others_of_a_joint_do_not(folder):
+    model, rivals = load_model(folder / "arm.toml"), [load_catalogue()[n] for n in RIVALS]
+
+    def ran(experiment, seed):
+        setpoint = setpoint_of(experiment, model, 0)
+        return arm_log(seed, balanced, planned=setpoint.part(0, len(setpoint)))
+
+    poor, held = (
+        {n: ran(Passes("elbow", span=0.5, speed=0.3, repeats=2), s)} for s, n in enumerate("ab")
+    )
+    found = plan(model, poor, held, between=rivals, axis="elbow", duration=8.0)
+    assert found.decides
+    told = {}
+    for experiment in (Tracking(8.0), found.chosen.experiment):
+        made = fit(model, {**poor, "c": ran(experiment, 2)}, held)
+        elbow = made.fits["elbow"], made.datasets["elbow"]
+        one = diagnose_axis(*elbow, Catalogue(rivals))
+        told[kind_of(experiment)] = one.named, one.ambiguous_with
+    assert told == {"tracking": (("gravity",), ("spring",)), "passes": (("gravity",), ())}
+
+
+@pytest.mark.parametrize("kind", ["moves", "tracking"])
+def test_a_simulated_arm_holds_its_weight_from_the_first_sample(folder, kind):
+    model, recorded = load_model(folder / "arm.toml"), read_log(folder / "1.mcap")
+    log = simulate(model, kind, duration=2.0)
+    for joint in JOINTS:
+        off = log.truth[joint]["position"] - log.axes[joint].columns["setpoint_position"]
+        assert np.abs(off).max() < 5e-4  # rad; under feedback alone it falls by 2 to 4 mrad
+        most = np.abs(recorded.axes[joint].force).max()  # weight included
+        assert model.axes[joint].hardware.force_limit == pytest.approx(2.0 * most, rel=0.01)
 
 
 def loaded(model: mujoco.MjModel) -> None:

@@ -297,7 +297,7 @@ class Sweep(OneAxis):
         """Largest amplitude in N that stays within what the moves leave of the axis' limits."""
         h = axis.hardware
         steepest = min(h.acceleration, h.jerk / (2.0 * math.pi * self.highest))
-        return min((1.0 - self.effort) * axis.mass * steepest, 0.5 * h.force_limit)
+        return min((1.0 - self.effort) * axis.weighed.mass * steepest, 0.5 * h.force_limit)
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,14 @@ class Mechanism:
         )  # fmt: skip
         return momentum, force
 
+    def carried(self, position: Array, acceleration: Array) -> Array:
+        """Force (n_axes, n) that holds the bodies' weight and accelerates them, SI units.
+
+        position, acceleration (n_axes, n): of each axis. Without what their velocities make.
+        """
+        momentum, force = self.along(position, acceleration, np.zeros_like(position))
+        return momentum + force
+
     @property
     def bodies(self) -> tuple[str, ...]:
         """Name of the body that each axis moves, or of its joint where the body has none."""
