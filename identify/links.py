@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -27,6 +26,7 @@ from identify.dataset.motion import smoothed_over
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Errors, Fit, fit_axis
+from identify.estimation.intervals import half_widths_by
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, least_t, part_of, taken
@@ -50,7 +50,6 @@ INERTIAL = {
     "inertia xy": "kg m^2", "inertia xz": "kg m^2", "inertia yz": "kg m^2",
 }  # fmt: skip
 RESOLVED = 1e-6  # of the largest singular value; below, a direction of the parameters is not told
-SURE = NormalDist().inv_cdf(0.95)  # standard deviations of half a 90 % band
 
 
 @dataclass(frozen=True, eq=False)
@@ -407,19 +406,24 @@ def _score(before: Mapping[str, Judged], after: Mapping[str, Judged], among: int
 
 
 def _bands(body: _Body, trial: _Trial, after: Mapping[str, Judged]) -> Array:
-    """Half the 90 % band (10,) of each parameter; no number where the joints do not tell it."""
-    rows, left = [], []
+    """Half the 90 % band (10,) of each parameter; no number where the joints do not tell it.
+
+    By the scatter between stretches of time, of all joints together: what friction leaves at its
+    reversals is no noise, and differs from joint to joint.
+    """
+    rows, left, time = [], [], []
     for axis, judged in after.items():
         own = np.concatenate([trial.forces(body, log)[kept] for log, kept in _kept(judged)])
         rows.append(unabsorbed(own, judged.fit.basis))
         left.append(judged.fit.residual / trial.before[axis].fit.floor)
-    told, noise = np.concatenate(rows), np.concatenate(left)
+        time.append(np.linspace(0.0, 1.0, len(left[-1])))
+    order = np.argsort(np.concatenate(time), kind="stable")
+    told, noise = np.concatenate(rows)[order], np.concatenate(left)[order]
     size = np.linalg.norm(told, axis=0)
     size[size < RESOLVED * size.max()] = np.inf
     _, singular, turned = np.linalg.svd(told / size, full_matrices=False)
     clear = singular > RESOLVED * singular[0]
-    spread = np.sqrt(np.mean(noise**2) * len(noise) / effective_samples(noise))
-    band = SURE * spread * np.linalg.norm(turned[clear] / singular[clear, None], axis=0) / size
+    band = half_widths_by(told / size @ turned[clear].T, noise, turned[clear]) / size
     hidden = np.linalg.norm(turned[~clear], axis=0) > np.sqrt(RESOLVED)
     return np.where(hidden | np.isinf(size), np.nan, band)
 

@@ -208,26 +208,31 @@ def half_widths_of(fit: Fit, weights: Array) -> Array:
 
     inf where a parameter that is not excited takes part.
     """
-    norms = np.linalg.norm(fit.jacobian, axis=0)
+    return half_widths_by(fit.jacobian, fit.residual, weights)
+
+
+def half_widths_by(jacobian: Array, residual: Array, weights: Array) -> Array:
+    """The same by a residual (n,) N and its Jacobian (n, k), in the order of time."""
+    norms = np.linalg.norm(jacobian, axis=0)
     excited = norms > 0
     out = np.full(weights.shape[1], np.inf)
     known = ~(weights[~excited] != 0.0).any(axis=0)
     if not excited.any():
         return out
-    columns = fit.jacobian[:, excited] / norms[excited]
+    columns = jacobian[:, excited] / norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=ROUNDING, hermitian=True)
     # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
     # without the block are used (jackknife, CR3).
-    honest = left_out(fit.residual, columns)
+    honest = left_out(residual, columns)
     scores = by_blocks(columns, honest, blocks_of(len(honest)))
     covariance = inverse @ (scores.T @ scores * (BLOCKS - 1) / BLOCKS) @ inverse
     own = weights[excited][:, known] / norms[excited][:, None]
     # A prior or a bound shifts the estimate from the least-squares solution by this much.
-    shift = np.abs(own.T @ inverse @ (columns.T @ fit.residual))
+    shift = np.abs(own.T @ inverse @ (columns.T @ residual))
     variance = np.einsum("ij,ik,kj->j", own, covariance, own)
     over_time = QUANTILE * np.sqrt(np.maximum(variance, 0.0))
     influence = columns @ (inverse @ own)
-    over_influence = [_by_influence(column, fit.residual) for column in influence.T]
+    over_influence = [_by_influence(column, residual) for column in influence.T]
     out[known] = np.maximum(over_time, over_influence) + shift
     return out
 

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 
+import arms
 import mujoco
 import numpy as np
 import pytest
@@ -293,6 +294,20 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     assert not any(d.findings for d in again.axes.values())
     said = refusal("add", "link_mass", "corrected.toml", *add[3:], "next.toml", folder=tmp_path)
     assert "the logs prove no body to correct it" in said
+
+
+@pytest.mark.slow
+def test_the_bands_of_a_body_hold_the_truth(folder, monkeypatch):
+    """Of a simulation whose steps err by less than the encoders: with four a sample they do not."""
+    monkeypatch.setattr(arms, "STEPS", 16)
+    truth = np.array([0.5, 0.15, 0.0, 0.0, 0.0, 0.045, 0.045, 0.0, 0.0, 0.0])
+    off = []
+    for seed in range(1000, 1012, 2):
+        a, b = (arm_log(k, change=loaded) for k in (seed, seed + 1))
+        found = fit(folder / "arm.toml", {"a": a}, {"b": b})
+        body = suspects_of(found.model, found.fits, found.datasets).body
+        off.append(np.abs(body.change - truth) / body.band)
+    assert 0.85 <= np.mean(np.array(off) < 1.0) < 1.0
 
 
 @pytest.mark.parametrize(
