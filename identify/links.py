@@ -297,7 +297,8 @@ class _Body:
         bodies = log.motion.bodies
         assert bodies is not None
         # The joints of a log share their motion, unless they begin at other instants.
-        key = (bodies.readings.__array_interface__["data"][0], bodies.readings.shape[1])
+        first = bodies.readings[0]
+        key = (first.__array_interface__["data"][0], len(first))
         if key not in self._known:
             motion = bodies.along(log.motion.sample_period)
             every = self.mechanism.per_unit(self.index, *motion)

@@ -71,14 +71,14 @@ class Bodies:
     """What the bodies of a mechanism take of one of its joints, (n,) each between a log's samples.
 
     momentum: N s, beyond mass x velocity. force: N, what they take beyond the change of momentum.
-    load: N, all that they take, smoothed. readings (n_axes, n + 1): m, of all joints, at the ends;
-    speeds (n_axes, n): m/s, smoothed, of all joints; index: which of them this one is.
+    load: N, all that they take, smoothed. readings: m, of each joint (n + 1,), at the ends, as the
+    log holds them; speeds (n_axes, n): m/s, smoothed, of all joints; index: which of them this is.
     """
 
     momentum: Array
     force: Array
     load: Array
-    readings: Array
+    readings: tuple[Array, ...]
     speeds: Array
     index: int
 
@@ -87,14 +87,15 @@ class Bodies:
 
         period: s, of the readings.
         """
-        return _middle(self.readings), between(self.readings, period), self.speeds
+        readings = np.stack(self.readings)
+        return _middle(readings), between(readings, period), self.speeds
 
     def during(self, samples: slice) -> Bodies:
         """The same of some samples."""
         first, end, _ = samples.indices(len(self.momentum))
         momentum, force, load = (a[first:end] for a in (self.momentum, self.force, self.load))
-        readings, speeds = self.readings[:, first : end + 1], self.speeds[:, first:end]
-        return Bodies(momentum, force, load, readings, speeds, self.index)
+        readings = tuple(r[first : end + 1] for r in self.readings)
+        return Bodies(momentum, force, load, readings, self.speeds[:, first:end], self.index)
 
     def with_more(self, momentum: Array, force: Array, samples: int, period: float) -> Bodies:
         """The same where the bodies take more, (n,) N s and N; smoothed over so many samples."""
@@ -219,7 +220,7 @@ class Motion:
         own = mass * velocity
         return own if self.bodies is None else own + self.bodies.momentum
 
-    @cached_property
+    @property
     def net(self) -> Array:
         """Command less what a mechanism's bodies take beyond mass x acceleration, (n,) N."""
         if self.bodies is None:
@@ -337,6 +338,9 @@ def motion_of(
         a: OtherAxis(log.axes[a].position, block, log.period, log.axes[a].kind)
         for a in other_axes(log, axis, machine)
     }
+    raw = signals[1:]  # in blocks of one sample
+    if block > 1:
+        raw = np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]]
     several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
     other = None if several else next(iter(found.values()), None)
     return Motion(
@@ -351,7 +355,7 @@ def motion_of(
         other_units=LINEAR if other is None else other.units,
         beside=found if several else {},
         position_noise=noise,
-        raw=np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]],
+        raw=raw,
         follows=_follows(log.axes[axis]),
         velocity_weight=weight,
         ripples=ripples,
@@ -428,9 +432,8 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
                 "of the others depend on its motion, so log it, or take the joint out of the file"
             )
     told = [log.axes[axis] for axis in mechanism.axes]
-    position = np.stack(
-        [together(a.position, a.columns.get("velocity"), log.period)[0] for a in told]
-    )
+    readings = tuple(together(a.position, a.columns.get("velocity"), log.period)[0] for a in told)
+    position = np.stack(readings)
     samples = smoothed_over(log.period, position.shape[1])
     smooth = local_parabola(position, samples, derivative=1, period=log.period)
     velocity, speeds = between(position, log.period), _middle(smooth)
@@ -438,7 +441,7 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
     load = force + local_parabola(momentum, samples, derivative=1, period=log.period)
     momentum -= mechanism.inertia[:, None] * velocity
     return {
-        axis: Bodies(momentum[i], force[i], load[i], position, speeds, i)
+        axis: Bodies(momentum[i], force[i], load[i], readings, speeds, i)
         for i, axis in enumerate(mechanism.axes)
     }
 
