@@ -44,6 +44,32 @@ def test_momentum_form_is_the_inverse_dynamics():
     assert np.all(np.abs(ours - np.transpose(wanted)).max(axis=1) < 1e-6 * largest)
 
 
+def test_what_holds_and_accelerates_bodies_is_the_inverse_dynamics_at_rest():
+    q, _, a = smooth_motion(1e-3, 5)
+    carried = mechanism_of(ARM, "arm.xml", OWN).carried(q, a)
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    for k in range(q.shape[1]):
+        data.qpos[:], data.qacc[:] = q[:, k], a[:, k]
+        mujoco.mj_inverse(model, data)
+        np.testing.assert_allclose(carried[:, k], data.qfrc_inverse, rtol=1e-9)
+
+
+def test_a_heavier_body_takes_what_its_parameters_say():
+    """Half a kilogram at the place of the fore arm's centre."""
+    motion, place = (lambda q, v, _: (q, v, v))(*smooth_motion(1e-3, 20)), (0.15, 0.02, 0.0)
+    file, heavier = (
+        mechanism_of(text, "arm.xml", OWN) for text in (ARM, ARM.replace('mass="2"', 'mass="2.5"'))
+    )
+    x, y, _ = place
+    more = [0.5, 0.5 * x, 0.5 * y, 0.0]
+    more += [0.5 * y * y, 0.5 * x * x, 0.5 * (x * x + y * y), -0.5 * x * y, 0.0, 0.0]
+    np.testing.assert_allclose(heavier.inertial(2) - file.inertial(2), more, atol=1e-12)
+    wanted = np.subtract(heavier.along(*motion), file.along(*motion))
+    found = np.einsum("k,pkan->pan", more, file.per_unit(2, *motion))
+    np.testing.assert_allclose(found, wanted, atol=1e-6 * np.abs(wanted).max())
+
+
 def test_axes_may_be_in_another_order_than_joints():
     q, v, _ = smooth_motion(1e-3, 20)
     straight = mechanism_of(ARM, "arm.xml", OWN).along(q, v, v)
