@@ -8,7 +8,8 @@ imitate it: a motor that saturates, a constant force. What is told in the end is
 answers, that with the body and that without.
 
 Another torque constant of one motor is a rival of the bodies: each takes a part of what the other
-makes. So a diagnosis offers it only on a joint where it takes more than any body does.
+makes. So a diagnosis offers it only on a joint where it takes more than any body does, and more
+than a constant force, of which it makes a part as well.
 """
 
 from __future__ import annotations
@@ -167,7 +168,8 @@ def suspects_of(
     if max(parts) < RULE.promise * RULE.least_part:
         return Suspects()
     if isinstance(first, _Motor):
-        return Suspects(motor=first.axis)
+        is_less = trial.part(_Constant(first.axis)) > max(parts)
+        return Suspects(motor=None if is_less else first.axis)
     next_body = [rival for rival in others if isinstance(rival, _Body)][:1]
     return Suspects(_accepted(first, next_body, len(rivals), trial, fits, datasets))
 
@@ -267,6 +269,14 @@ class _Motor:
     def forces(self, log: PreparedLog) -> Array:
         own = log.motion.axis == self.axis
         return log.fine.mean(log.motion.raw[1])[:, None] * float(own)
+
+
+@dataclass(frozen=True)
+class _Constant(_Motor):
+    """A constant force of an axis, of which a torque constant makes a part where weight pulls."""
+
+    def forces(self, log: PreparedLog) -> Array:
+        return np.full((len(log), 1), float(log.motion.axis == self.axis))
 
 
 @dataclass(frozen=True, eq=False)

@@ -237,6 +237,14 @@ def test_a_simulated_arm_holds_its_weight_from_the_first_sample(folder, kind):
         assert model.axes[joint].hardware.force_limit == pytest.approx(2.0 * most, rel=0.01)
 
 
+def test_a_constant_force_is_no_torque_constant(folder):
+    """Of 4 % of the weight, which masses could be: the motor had been named with 98 %."""
+    logs = [arm_log(s, lambda q, v: np.add(friction(q, v), [0.0, 0.0, 0.1])) for s in (101, 102)]
+    found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
+    told = suspects_of(found.model, found.fits, found.datasets)
+    assert (told.body, told.motor) == (None, None)
+
+
 def loaded(model: mujoco.MjModel) -> None:
     """A payload of 0.5 kg at 0.3 m on the fore arm."""
     fore = model.body("fore").id
