@@ -15,8 +15,9 @@ from identify.estimation.variable_projection import starts as start_values
 from identify.experiment_design.discrimination import Explanation
 from identify.experiment_design.planting import strength_for
 from identify.selection.trying import try_effect
+from twin.checks import moves
 from twin.effect import Effect, Kind
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
 from twin.experiments.kinds import Tracking
 from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -30,8 +31,16 @@ Rival = Effect | MachineModel
 
 
 def simulated_dataset(machine: MachineModel, axis: str) -> Dataset:
-    """A dataset of simulated random moves of the model, for use when there are no logs."""
+    """A dataset of simulated random moves of the model, for use when there are no logs.
+
+    Raises CannotRun where the drive does not move the axis.
+    """
     log = simulate(machine, Tracking(SIMULATED), seed=0, simulator=quickest(machine))
+    if not moves(log, axis):
+        raise CannotRun(
+            f"axis {axis}: its controller does not move it in a simulation of the model; check its "
+            "friction, inertia (of a geared joint add rotor_inertia), bandwidth and force_limit"
+        )
     return datasets(machine, {"simulated": log}, {})[axis]
 
 

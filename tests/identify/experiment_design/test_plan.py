@@ -17,7 +17,7 @@ from identify.output.text import diagnose_text, plan_text
 from identify.rules import RULE
 from identify.selection.diagnosis import Verdict
 from twin.effects import Catalogue, load_catalogue
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Passes
 from twin.experiments.named import simulate
@@ -164,6 +164,14 @@ def test_without_rivals_the_experiment_says_most_about_the_model():
     assert (found.favoured, found.supposed, found.gap.share) == (None, True, None)
     slow = [t for t in found.ranking if t.motion.motion.velocity.max() < 0.01]
     assert found.chosen.gain > max(t.gain for t in slow) + 1.0
+
+
+def test_an_axis_that_its_friction_holds_is_one_line():
+    """As a geared joint without its rotor, whose controller is as weak as its bodies are light."""
+    stage = stage_of(effect("coulomb_viscous", Fc=0.3, Fs=0.3, sigma2=0.01))
+    light = stage.with_axis("x", replace(stage.axes["x"], mass=1e-6))
+    with pytest.raises(CannotRun, match="axis x: its controller does not move it in a simulation"):
+        plan(light, catalogue=CATALOGUE, duration=4.0)
 
 
 def test_only_what_a_refit_leaves_counts() -> None:
