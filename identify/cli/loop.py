@@ -17,7 +17,6 @@ from identify.cli.command import Said, require_apart
 from identify.cli.progress import progress_on_stderr
 from identify.cli.shared import (
     ASSUMES,
-    MEANINGLESS,
     CheckedRecordings,
     Effects,
     FitLogs,
@@ -32,6 +31,7 @@ from identify.cli.shared import (
     app,
     briefly,
     loaded,
+    meaningless,
     minor,
     said_of,
     with_logs,
@@ -81,7 +81,9 @@ def fit(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.fit, catalogue=catalogue, test_function=test_function)
-    fitted, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
+    fitted, findings, silent = with_logs(
+        job, machine, logs, holdout, test, refused=meaningless(machine)
+    )
     warnings = [*briefly(findings), *silent]
     result: FitResult | SimulationFit = fitted
     if objective is Objective.SIMULATION:
@@ -145,7 +147,9 @@ def diagnose(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
-    result, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
+    result, findings, silent = with_logs(
+        job, machine, logs, holdout, test, refused=meaningless(machine)
+    )
     source = _source(model, test_function, effects)
     if html:
         title = f"{machine.name}: what the model lacks"
@@ -228,7 +232,9 @@ def add(
     else:
         made = workflow.add_shape if shape else workflow.add
         job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
-    result, findings, silent = with_logs(job, machine, logs, holdout, test, refused=MEANINGLESS)
+    result, findings, silent = with_logs(
+        job, machine, logs, holdout, test, refused=meaningless(machine)
+    )
     if file:
         write_atomically(file, (result.model.mjcf or "").encode())
     save_model(result.model, out)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
-MEANINGLESS = ("SIGN", "UNIT", "SWAPPED")  # faults with which a fit gives numbers without a meaning
 ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
@@ -91,6 +90,14 @@ def loaded(model: str, effects: list[Path] | None) -> tuple[MachineModel, Catalo
 
     catalogue = load_catalogue(effects or ())
     return load_model(model, catalogue), catalogue
+
+
+def meaningless(model: MachineModel) -> tuple[str, ...]:
+    """Names of the faults of a log with which a fit gives numbers without a meaning.
+
+    Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
+    """
+    return ("UNIT", "SWAPPED") if model.joints else ("SIGN", "UNIT", "SWAPPED")
 
 
 class Recordings(Mapping[str, "Log"]):
