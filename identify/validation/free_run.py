@@ -7,6 +7,7 @@ wrong force of the model.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from twin.model.machine import MachineModel
 from twin.signals import Array, local_cubic
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 
+LOGGER = logging.getLogger("identify")
 HORIZON = 0.5  # s between restarts
 SEED = 0  # of the added noise
 
@@ -130,11 +132,15 @@ def errors_of_both(
 ) -> tuple[tuple[float, float] | None, float | None]:
     """Free-running position error (m RMS) on the first log: before and after, and in MuJoCo after.
 
-    None where the motion is imposed.
+    None where the motion is imposed, and where a model runs away on the command of the log.
     """
     if after.is_imposed:
         return None, None
-    log = next(iter(by_log(prepared).values()))
-    runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+    name, log = next(iter(by_log(prepared).items()))
+    try:
+        runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+    except CannotRun as error:
+        LOGGER.warning("no free run on %s: %s", name, error)
+        return None, None
     was, now, replayed = (rms_error(run, axis) for run in runs)
     return (was, now), replayed
