@@ -15,12 +15,14 @@ from cli_runs import refusal, twin
 from strict_json import valid
 
 from identify.analysis.joint_signs import misassigned
+from identify.dataset.preparation import datasets
 from identify.estimation.open_loop import open_loop
 from identify.links import suspects_of
 from identify.output.as_json import answer_of
 from identify.output.text import text_of
 from identify.selection.diagnosis import diagnose_axis
 from identify.selection.trying import try_effect
+from identify.validation.free_run import errors_of_both
 from identify.workflow import compare, diagnose, fit, plan
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import setpoint_of
@@ -99,10 +101,13 @@ def test_a_model_that_runs_away_is_compared_by_its_torques_alone(folder, caplog)
     model = load_model(folder / "arm.toml")
     drag = Fitted.at_start(load_catalogue()["viscous_friction"], {"c": 1e5})
     stiff = model.axes["elbow"].with_effect(drag)
-    found = compare(model.with_axis("elbow", stiff), folder / "2.mcap").axes["elbow"]
+    wild = model.with_axis("elbow", stiff)
+    found = compare(wild, folder / "2.mcap").axes["elbow"]
     assert not found.position_error
     assert found.force_error
     assert "2.mcap: the simulation became unstable" in caplog.text
+    prepared = datasets(model, {"2.mcap": read_log(folder / "2.mcap")}, {})
+    assert errors_of_both(model, wild, "elbow", prepared) == (None, None)  # of an effect added
 
 
 def test_friction_holds_an_arm_against_its_weight():
