@@ -15,7 +15,7 @@ import numpy as np
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
 from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, bodies_along, motion_of
-from identify.dataset.prepared_log import at_rest
+from identify.dataset.prepared_log import stands
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.estimation.evidence import rms
@@ -136,7 +136,7 @@ def _rows(
         along = [np.sign(m.velocity), m.velocity, np.ones_like(m.velocity)]
         means = w.mean(np.stack([*along, *_of_place(m.position, place), m.net]))
         columns.append(np.concatenate([w.acceleration(m.velocity)[None], means]))
-        going.append(w.mean(at_rest(m.velocity).astype(float)) < AT_REST)
+        going.append(w.mean(stands(m).astype(float)) < AT_REST)
     rows, kept = np.hstack(columns), np.concatenate(going)
     rows = rows[:, kept] if np.count_nonzero(kept) >= ROWS else rows
     return rows[:-1], rows[-1]
@@ -182,7 +182,7 @@ def _static(
     """The friction (N) at which the axis breaks away from rest; None where it seldom does."""
     needed = []
     for m in motions:
-        rest = at_rest(m.velocity)
+        rest = stands(m)
         driven = m.net - found.gains[0] * m.acceleration - found.gains[3]
         driven = driven - found.gains[4:] @ _of_place(m.position, place)
         driven = np.convolve(driven, np.ones(SMOOTHED) / SMOOTHED, "same")

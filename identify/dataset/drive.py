@@ -22,6 +22,7 @@ from twin.signals import between, local_parabola
 Array = NDArray[np.float64]
 
 LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
+SAME_STEP = 0.9  # of the step that logs show, from which an encoder's is that
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -33,6 +34,14 @@ def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
 def is_noise(effect: Effect) -> bool:
     """Whether an effect adds only noise to the readings, so that none of it can be fitted."""
     return effect.kind is Kind.SENSING and all(p.fixed for p in effect.parameters)
+
+
+def knows_rounding(axis: AxisModel, motions: Sequence[Motion]) -> bool:
+    """Whether an axis rounds readings as these logs are: by an effect, or by its encoder's step."""
+    step = SAME_STEP * max(m.resolution for m in motions)
+    return axis.hardware.encoder_resolution >= step > 0.0 or any(
+        is_noise(f.effect) for f in axis.effects
+    )
 
 
 def actual_force(axis: AxisModel, motion: Motion) -> Array:

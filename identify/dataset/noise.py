@@ -30,7 +30,7 @@ import numpy as np
 
 from identify.dataset.drive import actual_force
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import at_rest, on_blocks, sticks, total_force
+from identify.dataset.prepared_log import on_blocks, stands, sticks, total_force
 from identify.dataset.readings import part_left, rate_gain, white_rounding
 from identify.dataset.spectrum import densities, fitted_levels, median_spectrum, pieces_of
 from identify.dataset.test_function import TestFunction
@@ -101,7 +101,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     raw = _raw_residual(axis, motion)
     # The median over segments ignores those with spikes and reversals, and what may stick: static
     # friction then balances the command and its noise, whatever they are.
-    still = at_rest(motion.velocity)
+    still = stands(motion)
     rests = np.repeat(still & sticks(axis), motion.raw.shape[1] // len(still))[1:]
     segment = min(max(round(SEGMENT / dt), 256), len(raw))
     frequency, power = median_spectrum(raw, segment, dt, rests)

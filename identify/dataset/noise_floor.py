@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from identify.dataset.drive import is_noise
+from identify.dataset.drive import knows_rounding
 from identify.dataset.motion import Motion
 from identify.dataset.noise import Noise, noises_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
@@ -97,8 +97,8 @@ def noise_beside(
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     """RMS noise floor in N of the force residual of these logs.
 
-    What the rounding of readings makes is a part of it where the axis has that effect; else it is
-    what the model lacks.
+    What the rounding of readings makes is a part of it where the axis has that effect, or an
+    encoder of that step; else it is what the model lacks.
     """
     return noise_beside(axis, logs).value
 
@@ -129,7 +129,7 @@ def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noi
         return _together([n.passed(w.motion, w.test_function) for n, w in pairs], motions)
 
     sensors = [_unrounded(n, m) for n, m in zip(noises, motions, strict=True)]
-    rounds, told = rounding_in(axis, logs), any(is_noise(f.effect) for f in axis.effects)
+    rounds, told = rounding_in(axis, logs), knows_rounding(axis, motions)
     parts = {
         "sensors": size([replace(n, folded=0.0) for n in sensors]),
         "rounding": rounds if told else 0.0,

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 Reach = tuple[float, float]  # lowest and highest position, m
 EVERYWHERE: Reach = (-np.inf, np.inf)
+SURE_REST = 3.0  # standard deviations of the readings' noise, by which a motion is more than it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,6 +134,26 @@ def at_rest(velocity: Array) -> NDArray[np.bool_]:
     return np.asarray(speed < REST_SPEED * speed.max())
 
 
+def stands(motion: Motion) -> NDArray[np.bool_]:
+    """In which blocks (n,) of a motion the axis may stick.
+
+    Where noise alone makes velocities as large, the mean over as many blocks as it takes tells it:
+    an axis that sticks for some of them seems to dither.
+    """
+    still = at_rest(motion.velocity)
+    least = REST_SPEED * float(np.abs(motion.velocity).max()) * motion.period
+    noise = SURE_REST * np.sqrt(2.0) * motion.position_noise
+    over = min(int(noise / least) + 1, len(still)) if least > 0.0 else 1
+    if over > 1:
+        gone = np.cumsum(np.pad(motion.velocity * motion.period, (1, 0)))
+        held = np.flatnonzero(np.abs(gone[over:] - gone[:-over]) < over * least)
+        edges = np.zeros(len(still) + 1)
+        np.add.at(edges, held, 1.0)
+        np.add.at(edges, held + over, -1.0)
+        still |= np.cumsum(edges)[:-1] > 0.0
+    return still
+
+
 def last_direction(velocity: Array) -> Array:
     """Sign (n,) of the velocity m/s, at rest as it was before; 0 before the first motion."""
     direction = np.where(at_rest(velocity), 0.0, np.sign(velocity))
@@ -149,7 +170,7 @@ def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
     for log in logs:
         mask = np.ones(len(log), bool) if log.reach == EVERYWHERE else log.reached
         if sticks:
-            still = at_rest(log.motion.velocity).astype(float)
+            still = stands(log.motion).astype(float)
             mask &= log.test_function.mean(still) < 0.02
         masks.append(mask)
     return np.concatenate(masks)

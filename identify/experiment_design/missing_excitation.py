@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.dataset.coordinates import since_reversal
 from identify.dataset.motion import Motion
-from identify.dataset.prepared_log import PreparedLog, at_rest
+from identify.dataset.prepared_log import PreparedLog, stands
 from twin.model.units import LINEAR
 from twin.signals import Array
 
@@ -70,7 +70,7 @@ def properties(log: PreparedLog) -> dict[str, Array]:
 
 def _rest(motion: Motion) -> Array:
     """Rest (n,) s before the last start of motion; while it lasts, how long so far."""
-    still = at_rest(motion.velocity)
+    still = stands(motion)
     index = np.arange(len(still))
     begun = np.maximum.accumulate(np.where(still, 0, index + 1))
     stood = np.where(still, index + 1 - begun, 0.0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise
+from identify.dataset.drive import is_noise, knows_rounding
 from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.scaling import Scaling
@@ -87,7 +87,8 @@ def tried_beside(
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
     trim_memory()
-    noise = [as_noise(judged, e) for e in effects if is_noise(e)]
+    rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.fit])
+    noise = [as_noise(judged, e) for e in effects if is_noise(e) and not rounded]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
     candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]

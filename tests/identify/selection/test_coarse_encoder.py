@@ -1,0 +1,81 @@
+"""A drive as many are: dry friction that sticks at each turn, and an encoder of a micrometre."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import identify
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from twin.logs import AxisLog, Log
+
+RATE, SECONDS, SUB = 1000, 10.0, 10
+MASS, COULOMB, VISCOUS = 12.0, 9.0, 25.0  # kg, N, N s/m
+PITCH, HEIGHT = 0.020, 2.5  # m, N
+
+
+def setpoint(rng: np.random.Generator) -> np.ndarray:
+    """Moves of minimum jerk from place to place without a rest, m."""
+    parts, at, count = [], 0.15, round(SECONDS * RATE)
+    while sum(map(len, parts)) < count:
+        to, speed, steep = rng.uniform(0.02, 0.48), rng.uniform(0.05, 0.4), rng.uniform(1.0, 4.0)
+        way = abs(to - at)
+        lasts = max(1.875 * way / speed, np.sqrt(5.77 * way / steep), 0.05)
+        s = np.linspace(0.0, 1.0, round(lasts * RATE))[1:]
+        parts.append(at + (to - at) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5))
+        at = to
+    return np.concatenate(parts)[:count]
+
+
+def recorded(seed: int, step: float, height: float) -> Log:
+    """A PID loop at the log's rate; friction holds the mass until the force exceeds it."""
+    rng = np.random.default_rng(seed)
+    wanted = setpoint(rng)
+    speed = np.gradient(wanted, 1.0 / RATE)
+    ahead = MASS * np.gradient(speed, 1.0 / RATE) + COULOMB * np.tanh(speed / 0.01)
+    reading, force = np.zeros((2, len(wanted)))
+    seen, pushed = (
+        0.3e-6 * rng.standard_normal(len(wanted)),
+        0.02 * rng.standard_normal(len(wanted)),
+    )
+    x, v, total, dt = float(wanted[0]), 0.0, 0.0, 1.0 / RATE / SUB
+    for k in range(len(wanted)):
+        reading[k] = np.round((x + seen[k]) / step) * step
+        error = wanted[k] - reading[k]
+        rate = speed[k] - (reading[k] - reading[k - 1]) * RATE if k else 0.0
+        total += error / RATE
+        force[k] = ahead[k] + 6e4 * error + 1200.0 * rate + 4e5 * total
+        for _ in range(SUB):
+            pull = force[k] + pushed[k] - VISCOUS * v + height * np.sin(2.0 * np.pi * x / PITCH)
+            free = v + pull / MASS * dt
+            held = COULOMB / MASS * dt
+            before, v = v, (free - held if free > held else free + held if free < -held else 0.0)
+            x += 0.5 * (before + v) * dt
+    return Log(RATE, {"x": AxisLog({"position": reading, "force": force})})
+
+
+def found(step: float, height: float = 0.0) -> AxisDiagnosis:
+    logs = {str(seed): recorded(seed, step, height) for seed in (1, 2, 3)}
+    held = {"3": logs.pop("3")}
+    return identify.diagnose(identify.first_model(logs), logs, held).axes["x"]
+
+
+@pytest.mark.parametrize("step", [1e-6, pytest.param(1e-8, marks=pytest.mark.slow)])
+def test_nothing_is_missing(step: float) -> None:
+    """Noise of the readings is as fast as what sticks for some milliseconds and is at rest."""
+    answer = found(step)
+    assert answer.verdict is Verdict.NOTHING_MISSING
+    assert answer.base.ratio < 1.15
+    values = answer.base.axis["coulomb_viscous"].values
+    assert answer.base.axis.mass == pytest.approx(MASS, rel=2e-3)
+    assert values["Fc"] == pytest.approx(COULOMB, rel=5e-3)
+    assert values["sigma2"] == pytest.approx(VISCOUS, rel=1e-2)
+
+
+def test_cogging_is_named_and_nothing_beside_it() -> None:
+    answer = found(1e-6, HEIGHT)
+    assert answer.named == ("cogging",)
+
+    values = answer.final.axis["cogging"].values
+    assert values["p"] == pytest.approx(PITCH, rel=1e-3)
+    assert answer.final.at_floor
