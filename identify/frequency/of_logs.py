@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.analysis.first_model import first_model
 from identify.frequency.loop import Loop, loop_of
 from identify.frequency.plant import Banded, Plant, plant_of
 from identify.frequency.response import Record, Response, response
 from twin.core.control import Controller
+from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.follow import replay
 from twin.logs import Log
@@ -21,6 +23,7 @@ from twin.progress import Progress, silent
 from twin.simulator import quickest
 
 NEAR = 0.1  # of a mass, to which a response of little friction tells it
+MUCH = 0.5  # of the force, RMS, from which dry friction is much
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +37,10 @@ class Shown:
 
 @dataclass(frozen=True, eq=False)
 class Bias:
-    """That a model's own mass, kg, is not what its simulated response shows; None: shows none."""
+    """That a mass, kg, is not what the response shows; None: it shows none.
+
+    own: the model's, whose simulation is shown. Without one that of least squares with friction.
+    """
 
     own: float
     back: Banded | None
@@ -44,8 +50,8 @@ class Bias:
 class AxisFrequency:
     """One axis: as the logs show it, and as the model in their place does; None without one.
 
-    bias: where friction is so much of the force that not even the model's own mass comes back; then
-    no plant is read off either.
+    bias: where friction is so much of the force that a known mass does not come back; then neither
+    plant nor loop is read off.
     """
 
     units: AxisUnits
@@ -72,22 +78,41 @@ def responses_of(
         progress("frequency response", i, len(names))
         controller = None if model is None else Controller.for_axis(model.axes[name])
         kind, measured = first.axes[name].kind, _shown(logs, name, controller)
-        axes[name] = AxisFrequency(kind, measured, None)
-        if model is not None:
-            modelled = _shown(simulated, name, controller)
-            bias = None if model.joints else _bias(model.axes[name].weighed.mass, modelled.plant)
-            if bias is not None:
-                measured, modelled = (replace(s, plant=None) for s in (measured, modelled))
-            axes[name] = AxisFrequency(kind, measured, modelled, bias)
+        if model is None:
+            bias = _bias(_with_friction(logs, name), measured.plant)
+            axes[name] = AxisFrequency(kind, _less(measured, bias), None, bias)
+            continue
+        modelled = _shown(simulated, name, controller)
+        bias = _bias(None if model.joints else model.axes[name].weighed.mass, modelled.plant)
+        axes[name] = AxisFrequency(kind, _less(measured, bias), _less(modelled, bias), bias)
     return axes
 
 
-def _bias(own: float, plant: Plant | None) -> Bias | None:
-    """Of the mass of a model, kg, that its response shows; None where it comes back."""
+def _less(shown: Shown, bias: Bias | None) -> Shown:
+    return shown if bias is None else replace(shown, plant=None, loop=None)
+
+
+def _bias(own: float | None, plant: Plant | None) -> Bias | None:
+    """Of a mass, kg, that is known; None where it is not, or comes back."""
     back = None if plant is None else plant.mass
-    if back and abs(back.value - own) < max(back.band, NEAR * own):
+    if own is None or (back and abs(back.value - own) < NEAR * own):
         return None
     return Bias(own, back)
+
+
+def _with_friction(logs: Mapping[str, Log], name: str) -> float | None:
+    """The mass, kg, that least squares find beside much dry friction; None where there is little.
+
+    Of a machine whose elasticity a rigid model has as friction the response is what tells.
+    """
+    alone = {n: Log(log.sample_rate, {name: log.axes[name]}) for n, log in logs.items()}
+    try:
+        axis = first_model(alone, name, load_catalogue()).axes[name]
+    except (InputError, KeyError):
+        return None
+    dry = axis.friction.values.get("Fc", 0.0) if axis.friction else 0.0
+    force = np.concatenate([log.axes[name].force for log in logs.values()])
+    return axis.mass if dry > MUCH * float(np.std(force)) else None
 
 
 def _moves(log: Log, name: str) -> bool:

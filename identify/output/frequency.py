@@ -42,11 +42,13 @@ def _caution(axis: AxisFrequency) -> str:
         known = f"; the model's own {mass} comes back from its simulation"
         asked = "; with MODEL, whose simulation shows how much"
         return f"friction adds to these values{known if axis.modelled else asked}"
-    own = number(bias.own)
+    own = f"{number(bias.own)} {axis.units.mass}"
     back = "none" if bias.back is None else _with_band(bias.back, axis.units.mass)
+    of = f"of the {own} that least squares with friction find this response shows {back}"
+    if axis.modelled:
+        of = f"of the model's own {own} its simulation on this motion shows {back}"
     return (
-        f"{mass} and delay are not read off: of the model's own {own} {axis.units.mass} its "
-        f"simulation on this motion shows {back}, as friction is too much of the force; "
+        f"{mass}, delay and loop are not read off: {of}, as friction is too much of the force; "
         "`twin simulate multisine` excites more"
     )
 
@@ -63,7 +65,7 @@ def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
         share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))
         facts.append(("neither noise nor linear", f"{percent(share)} of its variance (median)"))
     if axis.bias is not None:
-        return [*facts, _loop(shown)]
+        return facts
     if shown.plant is None:
         few = "too few frequencies to read it off; `twin simulate multisine` excites more"
         return [*facts, (units.mass_name, few), _loop(shown)]

@@ -62,7 +62,7 @@ class ShownEntry(Entry):
 
 
 class BiasEntry(Entry):
-    """The model's own mass, and what its simulated response shows of it."""
+    """The model's own mass, else that of least squares, and what the response shows of it."""
 
     own: Number
     back: BandedEntry | None
@@ -71,7 +71,7 @@ class BiasEntry(Entry):
 class AxisFrequencyEntry(Entry):
     """One axis as the logs show it, and as the model in their place does.
 
-    bias: null where the model's own mass comes back; else no plant is read off.
+    bias: null where a known mass comes back; else neither plant nor loop is read off.
     """
 
     measured: ShownEntry
