@@ -274,7 +274,7 @@ const html = (text) => text.replace(/[&<>]/g, (c) => `&#${c.charCodeAt(0)};`).re
 for (const axis of data.axes) {
   const bars = axis.forces.map((f) => `<dt>${html(f.name)}</dt><dd><i></i></dd><dd></dd>`).join("");
   const part = document.createElement("section");
-  part.innerHTML = `<h2>Axis ${html(axis.name)}</h2><table><tbody><tr><th>measured<td><tr><th class="mark">setpoint<td><tr${data.horizon ? "" : " hidden"}><th class="ghost">model<td></table>` +
+  part.innerHTML = `<h2>Axis ${html(axis.name)}</h2><table><tbody><tr><th>measured<td><tr><th class="mark">setpoint - measured<td><tr${data.horizon ? "" : " hidden"}><th class="ghost">model - measured<td></table>` +
     (bars && `<h3>${axis.bars}</h3><dl>${bars}</dl>`);
   at("panel").append(part);
   axis.cells = part.querySelectorAll("td");

@@ -37,6 +37,12 @@ def check_content(axis: Axis) -> Iterator[Finding]:
             yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
         else:
             yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
+    if axis.sample_rate < limits.SLOWEST:
+        what = (
+            f"the log has {axis.sample_rate:.3g} samples a second and lasts {axis.duration:.4g} s; "
+            f"a fit needs {limits.SLOWEST:g} Hz"
+        )
+        yield axis.error(Fault.UNIT, what, "correct the unit of the time, or record faster")
     if axis.duration < limits.SHORTEST:
         what = f"the log lasts {axis.duration:.3g} s, a fit needs {limits.SHORTEST:g} s"
         yield axis.error(Fault.TOO_SHORT, what, "record longer")

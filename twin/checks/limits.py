@@ -115,6 +115,7 @@ ALIKE_SETPOINT = 0.98  # correlation of a position and the setpoint that it foll
 
 # What a fit needs
 
+SLOWEST = 10.0  # Hz; no motion of an axis shows at fewer samples
 SHORTEST = 0.5  # s, least duration for identification
 COARSE = 0.3  # acceleration noise as a part of the acceleration
 ROUNDED = 0.05  # the same, where it is the rounding: that is no noise and does not average out

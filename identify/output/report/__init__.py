@@ -46,7 +46,7 @@ def write_report(
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    warnings = [("Not confirmed", line) for line in assumed] + [("Fault", line) for line in faults]
+    warnings = [("Assumed", line) for line in assumed] + [("Fault", line) for line in faults]
     shown, signals = sections(subject), explored(subject)
     text = whole_page(subject.title, facts(subject), shown, signals, origin(subject), warnings)
     write_atomically(path, text.encode("utf-8"))

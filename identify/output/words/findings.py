@@ -128,9 +128,11 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
         return []
     one = found.findings[0]  # noise is part of what is left, and so never more
     chosen, fitted = max(one.left, 1.0), max(found.final.error / floor, 1.0)
-    said = f"What is left is {fitted:.2f} times the noise floor on the training logs"
+    own = quantity(floor, one.unit)
+    said = f"What is left is {fitted:.2f} times the noise floor of {own} on the training logs"
     if one.chosen.on is not Role.TRAINING:
-        said += f" and {chosen:.2f} times on the {one.chosen.on.value} logs"
+        other = quantity(one.chosen.after / one.left, one.unit)
+        said += f" and {chosen:.2f} times that of {other} on the {one.chosen.on.value} logs"
     what = "noise" if max(chosen, fitted) < RULE.at_floor else "something else is missing too"
     return [f"{said}: {what}."]
 

@@ -69,8 +69,9 @@ def test_the_answer_where_error_remains_beside_what_is_named():
     left = made.diagnosis_of(unexplained=made.STRUCTURE)
     card, _ = cards(made.diagnosed(left))
     assert card.sentence.startswith(
-        f"{SEVERAL} What is left is 1.57 times the noise floor on the training logs and 1.00 times "
-        "on the selection logs: something else is missing too. The error depends most on other"
+        f"{SEVERAL} What is left is 1.57 times the noise floor of 2.03 N on the training logs and "
+        "1.00 times that of 2.19 N on the selection logs: something else is missing too. The error "
+        "depends most on other"
     )
     where = region_in_words(made.LEFT_OVER)
     assert card.sentence.endswith(f"It is largest at {where}.")

@@ -73,10 +73,12 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
     for p in of.periodic:
         phase = np.arange(ENTRIES) * 360.0 / ENTRIES
         unit = f"force ({units.force})" if not known else "current (A)"
-        files[f"{name}_{p.name}.csv"] = csv_text({"phase (deg)": phase, unit: p.force / constant})
+        turn = f"{p.period:.9g} {units.position}"
+        table = {f"phase (deg; 360 are {turn} from position 0)": phase, unit: p.force / constant}
+        files[f"{name}_{p.name}.csv"] = csv_text(table)
         terms = p.harmonics().items()
         rows = [f"{k},{abs(c) / constant:.9g},{degrees(np.angle(c)):.9g}" for k, c in terms]
-        head = f"harmonic (1),amplitude of the {unit},phase of the cosine (deg)"
+        head = f"harmonic of {turn} (1),amplitude of the {unit},phase of the cosine (deg)"
         files[f"{name}_{p.name}_harmonics.csv"] = "\n".join([head, *rows]) + "\n"
     return files
 
