@@ -33,6 +33,7 @@ OUTPUTS = (
     "plot",
     "setpoints",
     "video",
+    "rerun",
 )  # parameters: what is written
 UPDATED = {"fit": "model", "add": "model"}  # what a command may write over: it holds all of it
 AS_JSON = inspect.Parameter(

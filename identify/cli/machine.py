@@ -354,6 +354,9 @@ def view(
         Path | None, typer.Option(help="Page to write, which replays it in any browser.")
     ] = None,
     video: Annotated[Path | None, typer.Option(help="MP4 to write, without a display.")] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(help="Recording (.rrd) to write, for the viewer of Rerun.")
+    ] = None,
     speed: Annotated[float, typer.Option(help="Speed of the replay; 1 is real time.")] = 1.0,
     gain: Annotated[
         float | None,
@@ -367,7 +370,7 @@ def view(
 ) -> Said:
     """Show the machine as measured, as modelled and as commanded, with forces and what is left.
 
-    In MuJoCo's viewer, unless a page or a video is asked for.
+    In MuJoCo's viewer, unless a page, a video or a recording is asked for.
 
     Example: twin view test.mcap fitted.toml --html replay.html
     """
@@ -391,16 +394,20 @@ def view(
         from identify.view.page import write_page
 
         write_page(html, shown, times, speed)
-    if not (html or video):
+    if rerun:
+        from identify.view.rerun import write_recording
+
+        write_recording(rerun, shown, times, speed)
+    if not (html or video or rerun):
         from identify.view.live import show
 
         show(shown, times, speed)
     seconds = len(shown) / shown.rate
     answer = ViewAnswer.of(
-        shown, log=log, html=html, video=video, axes=list(shown.axes), duration=seconds, gain=times,
-        left_out=silent,
+        shown, log=log, html=html, video=video, rerun=rerun, axes=list(shown.axes),
+        duration=seconds, gain=times, left_out=silent,
     )  # fmt: skip
     drawn = "at their true size" if times == 1.0 else f"{times:g} times as large"
     said = f"{seconds:.3g} s of {log}, differences drawn {drawn}"
-    text = "\n".join(f"{path}: {said}" for path in (html, video) if path)
+    text = "\n".join(f"{path}: {said}" for path in (html, video, rerun) if path)
     return Said(text, answer, [*silent, *shown.notes])

@@ -14,24 +14,13 @@ from numpy.typing import ArrayLike
 
 from identify.output.numbers import packed
 from identify.view.replay import AxisReplay, Replay
-from identify.view.stage import Stage
+from identify.view.stage import Stage, eye, shapes
 from twin.files import write_atomically
 from twin.signals import Array
 
 OF_MESHES = 900_000  # bytes, so that the page has 3 MB at most: see identify.view.replay
 STEPS = 32_767  # of a signal on either side of its middle; -32768 stands for none
 CELLS = (65_535, 512, 256, 128, 64, 32, 16, 8)  # of a mesh along its longest side, until it fits
-VISIBLE = 3  # groups of geoms that MuJoCo shows by default
-CLEAR = 0.05  # alpha below which a shape is not drawn
-SHAPES = {
-    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
-    mujoco.mjtGeom.mjGEOM_SPHERE: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
-}
 
 
 def write_page(path: Path, replay: Replay, gain: float, speed: float) -> None:
@@ -40,7 +29,7 @@ def write_page(path: Path, replay: Replay, gain: float, speed: float) -> None:
         loader=PackageLoader("identify.view", "."), autoescape=True, undefined=StrictUndefined
     )
     text = environment.get_template("page.html.j2").render(
-        title=": ".join(dict.fromkeys((replay.machine.name, replay.log))),
+        title=replay.title,
         notes=replay.notes,
         data={
             "gain": gain, "speed": speed, "horizon": replay.horizon, "start": replay.start,
@@ -92,10 +81,7 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
     link_of = [links.index(chain) for chain in chains]
     meshes: dict[int, int] = {}
     geoms = []
-    for i in range(model.ngeom):
-        shape, rgba = SHAPES.get(mujoco.mjtGeom(model.geom_type[i])), _colour(model, i)
-        if shape is None or rgba[3] < CLEAR or model.geom_group[i] >= VISIBLE:
-            continue
+    for i, shape, rgba in shapes(model):
         geom = {
             "shape": shape, "size": _short(model.geom_size[i]), "at": _short(data.geom_xpos[i]),
             "turned": _short(data.geom_xmat[i]), "rgb": _short(rgba[:3]),
@@ -115,7 +101,7 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
         "links": links, "geoms": geoms, "marks": marks,
         "meshes": [_mesh(model, m, share) for m in meshes],
         "extent": float(model.stat.extent), "centre": _short(model.stat.center),
-        **_camera(model, data),
+        "eye": _short(eye(model, data)), "fovy": float(model.cam_fovy[0]) if model.ncam else 45.0,
     }  # fmt: skip
 
 
@@ -136,29 +122,6 @@ def _chain(
         for j in range(first, first + count)
         if j in names
     ]
-
-
-def _camera(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Any]:
-    """Where the first camera of the model stands; without one, where MuJoCo's would."""
-    if model.ncam:
-        return {"eye": _short(data.cam_xpos[0]), "fovy": float(model.cam_fovy[0])}
-    away = 1.5 * model.stat.extent * np.array([0.5, -0.7, 0.5])
-    return {"eye": _short(model.stat.center + away), "fovy": 45.0}
-
-
-def _colour(model: mujoco.MjModel, geom: int) -> Array:
-    """Red, green, blue, alpha of a geom: of its material with the mean of its texture."""
-    material = int(model.geom_matid[geom])
-    if material < 0:
-        return np.asarray(model.geom_rgba[geom], dtype=float)
-    rgba = np.array(model.mat_rgba[material], dtype=float)
-    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
-    if texture >= 0:
-        channels, begin = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
-        end = begin + channels * int(model.tex_width[texture]) * int(model.tex_height[texture])
-        mean = model.tex_data[begin:end].reshape(-1, channels).mean(axis=0) / 255.0
-        rgba[:3] *= mean[:3] if channels >= 3 else mean[0]
-    return rgba
 
 
 def _mesh(model: mujoco.MjModel, mesh: int, most: int) -> dict[str, Any]:

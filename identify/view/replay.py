@@ -71,6 +71,11 @@ class Replay:
         return len(next(iter(self.axes.values())).measured)
 
     @property
+    def title(self) -> str:
+        """What it is called: machine and log."""
+        return ": ".join(dict.fromkeys((self.machine.name, self.log)))
+
+    @property
     def gain(self) -> float:
         """By how much the differences to the measured motion are drawn larger, so as to be seen.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -20,6 +20,19 @@ BEHIND = 0.998  # of its size, at which a ghost that is where the machine is lie
 SHADOW = 1024  # pixels of its map: what a display without a graphics card draws in time
 ABOVE = 0.04  # of the machine, by which a mark stands above its axis
 END = 0.9  # of half the length of a shape: where its mark stands
+BALL = 0.012  # of the machine: the radius of a mark
+PLANE = 4.0  # of the machine: half the size of a plane without end
+VISIBLE = 3  # groups of geoms that MuJoCo shows by default
+CLEAR = 0.05  # alpha below which a shape is not drawn
+SHAPES = {
+    mujoco.mjtGeom.mjGEOM_PLANE: "plane",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +73,11 @@ class Stage:
         for data in (self.data, self.ghost, self.aim):
             mujoco.mj_kinematics(self.model, data)
 
+    def mark(self, axis: str) -> Array:
+        """Where the mark of the setpoint of an axis is in this pose, (3,) m."""
+        body, place = self.marks[axis]
+        return np.array(self.aim.xpos[body] + self.aim.xmat[body].reshape(3, 3) @ place)
+
     def draw_others(
         self, replay: Replay, frame: int, scene: mujoco.MjvScene, ghost: bool = True
     ) -> None:
@@ -73,13 +91,12 @@ class Stage:
             for geom in (scene.geoms[i] for i in range(first, scene.ngeom)):
                 geom.rgba[:], geom.matid, geom.transparent = GHOST, -1, 1
                 geom.size[:] = BEHIND * np.asarray(geom.size)
-        size = 0.012 * self.model.stat.extent
-        for axis, (body, place) in self.marks.items():
+        size = BALL * self.model.stat.extent
+        for axis in self.marks:
             if np.isfinite(replay.axes[axis].setpoint[frame]) and scene.ngeom < scene.maxgeom:
-                at = self.aim.xpos[body] + self.aim.xmat[body].reshape(3, 3) @ place
                 mujoco.mjv_initGeom(
-                    scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, size), at,
-                    np.eye(3).ravel(), np.array(MARK, dtype=np.float32),
+                    scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, size),
+                    self.mark(axis), np.eye(3).ravel(), np.array(MARK, dtype=np.float32),
                 )  # fmt: skip
                 scene.ngeom += 1
 
@@ -117,3 +134,33 @@ def _mark(model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> tuple[int, 
         place[along] -= END * reach[along]
     place[2] = max(top, place[2]) + ABOVE * model.stat.extent
     return body, data.xmat[body].reshape(3, 3).T @ (place - data.xpos[body])
+
+
+def shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Array]]:
+    """The geoms that are seen: number, shape, and red, green, blue, alpha."""
+    for i in range(model.ngeom):
+        shape, rgba = SHAPES.get(mujoco.mjtGeom(model.geom_type[i])), _colour(model, i)
+        if shape and rgba[3] >= CLEAR and model.geom_group[i] < VISIBLE:
+            yield i, shape, rgba
+
+
+def eye(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Where the first camera of the model stands; without one, where MuJoCo's would."""
+    if model.ncam:
+        return np.array(data.cam_xpos[0])
+    return np.array(model.stat.center + 1.5 * model.stat.extent * np.array([0.5, -0.7, 0.5]))
+
+
+def _colour(model: mujoco.MjModel, geom: int) -> Array:
+    """Red, green, blue, alpha of a geom: of its material with the mean of its texture."""
+    material = int(model.geom_matid[geom])
+    if material < 0:
+        return np.asarray(model.geom_rgba[geom], dtype=float)
+    rgba = np.array(model.mat_rgba[material], dtype=float)
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    if texture >= 0:
+        channels, begin = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
+        end = begin + channels * int(model.tex_width[texture]) * int(model.tex_height[texture])
+        mean = model.tex_data[begin:end].reshape(-1, channels).mean(axis=0) / 255.0
+        rgba[:3] *= mean[:3] if channels >= 3 else mean[0]
+    return rgba

@@ -184,6 +184,7 @@ class ViewAnswer(Answer):
     log: File
     html: File | None
     video: File | None
+    rerun: File | None
     axes: list[str]
     duration: float
     duration_unit: Literal["s"] = "s"
