@@ -103,6 +103,8 @@ class Command(TyperCommand):
         for name, path in outputs.values():
             if name == "html" and path.suffix.lower() not in (".html", ".htm"):
                 raise InputError(f"{path}: a report is an .html file; give such a name")
+            if name == "rerun" and path.suffix.lower() != ".rrd":
+                raise InputError(f"{path}: Rerun opens an .rrd file; give such a name")
             if name != FOLDER:
                 require_writable(path)
         return super().invoke(ctx)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from identify.output.numbers import packed
 from identify.view.replay import AxisReplay, Replay
-from identify.view.stage import Stage, eye, shapes
+from identify.view.stage import Stage, camera, shapes
 from twin.files import write_atomically
 from twin.signals import Array
 
@@ -96,12 +96,13 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
         for i, (axis, (body, place)) in enumerate(stage.marks.items())
         if np.isfinite(replay.axes[axis].setpoint).any()
     ]  # fmt: skip
+    eye, fovy = camera(model, data)
     share = OF_MESHES // max(len(meshes), 1)
     return {
         "links": links, "geoms": geoms, "marks": marks,
         "meshes": [_mesh(model, m, share) for m in meshes],
         "extent": float(model.stat.extent), "centre": _short(model.stat.center),
-        "eye": _short(eye(model, data)), "fovy": float(model.cam_fovy[0]) if model.ncam else 45.0,
+        "eye": _short(eye), "fovy": fovy,
     }  # fmt: skip
 
 

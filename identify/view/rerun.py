@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from identify.view.replay import AxisReplay, Replay
-from identify.view.stage import BALL, BEHIND, GHOST, MARK, PLANE, Stage, eye, shapes
+from identify.view.stage import BALL, BEHIND, GHOST, MARK, PLANE, Stage, camera, shapes
 from twin.errors import InputError
 from twin.files import write_atomically
 from twin.signals import Array
@@ -28,7 +28,9 @@ except ImportError as error:
 TIME = "time"  # s, of the log
 MACHINE, CURVES = "machine", "signals"  # first parts of the names of what is recorded
 MEASURED, MODELLED, SETPOINT = "measured", "modelled", "setpoint"
+COLOURS = {MODELLED: GHOST[:3], SETPOINT: MARK[:3]}  # of curves, as of what moves
 SHARES = (3, 2)  # of the height: of the machine, of its signals
+FOVY = 55.0  # degrees that Rerun shows from top to bottom
 SKY = (205, 212, 219)  # behind the machine
 XYZW = [1, 2, 3, 0]  # a quaternion of Rerun, in one of MuJoCo
 
@@ -49,6 +51,8 @@ def write_recording(path: Path, replay: Replay, gain: float, speed: float) -> No
             for of, curves in _curves(own).items():
                 for curve, values in curves.items():
                     name = _name(CURVES, axis, of, curve)
+                    if curve in COLOURS:
+                        recording.log(name, rr.SeriesLines(colors=COLOURS[curve]), static=True)
                     recording.send_columns(name, times, rr.Scalars.columns(scalars=values))
         recording.disconnect()
         write_atomically(path, made.read_bytes())
@@ -65,17 +69,18 @@ def _layout(stage: Stage, replay: Replay, gain: float, speed: float) -> Any:
         )
         for axis, own in replay.axes.items()
     ]  # fmt: skip
+    centre, (seen_from, fovy) = stage.model.stat.center, camera(stage.model, stage.data)
+    nearer = np.tan(np.radians(0.5 * fovy)) / np.tan(np.radians(0.5 * FOVY))
+    look = rrb.EyeControls3D(
+        position=centre + nearer * (seen_from - centre), look_target=centre, eye_up=(0.0, 0.0, 1.0)
+    )
+    drawn = "true size" if gain == 1.0 else f"differences drawn {gain:g} times as large"
     machine = rrb.Spatial3DView(
-        origin=MACHINE, background=SKY, line_grid=False,
-        name="true size" if gain == 1.0 else f"differences drawn {gain:g} times as large",
-        eye_controls=rrb.EyeControls3D(
-            position=eye(stage.model, stage.data), look_target=stage.model.stat.center,
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-    )  # fmt: skip
+        origin=MACHINE, name=drawn, background=SKY, line_grid=False, eye_controls=look
+    )
     return rrb.Blueprint(
         rrb.Vertical(machine, rrb.Tabs(*tabs), row_shares=SHARES),
-        rrb.TimePanel(timeline=TIME, playback_speed=speed, state="collapsed"),
+        rrb.TimePanel(timeline=TIME, playback_speed=speed, play_state="paused", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
     )
@@ -91,13 +96,15 @@ def _body(stage: Stage, machine: str, body: int) -> str:
 
 def _shapes(stage: Stage, replay: Replay) -> Iterator[tuple[str, list[Any]]]:
     """Each shape and its place in its body; those that a model moves once more, as its ghost."""
-    model = stage.model
+    model, data = stage.model, stage.data
+    for body in np.flatnonzero(model.body_weldid == 0).tolist():
+        stands = rr.Transform3D(translation=data.xpos[body], quaternion=data.xquat[body, XYZW])
+        yield _body(stage, MEASURED, body), [stands]
     for i, shape, rgba in shapes(model):
         body, at, turned = int(model.geom_bodyid[i]), model.geom_pos[i], model.geom_quat[i, XYZW]
-        drawn = {MEASURED: (rgba, 1.0), MODELLED: (GHOST, BEHIND)}
-        if not (replay.horizon and model.body_weldid[body]):
-            del drawn[MODELLED]
-        for machine, (colour, scale) in drawn.items():
+        looks = [(MEASURED, rgba, 1.0), (MODELLED, GHOST, BEHIND)]
+        moves = replay.horizon and model.body_weldid[body]
+        for machine, colour, scale in looks if moves else looks[:1]:
             place = rr.Transform3D(translation=at, quaternion=turned, scale=scale)
             yield f"{_body(stage, machine, body)}/{i}", [place, _drawn(model, i, shape, colour)]
     for axis in replay.axes:
@@ -139,8 +146,8 @@ def _motion(stage: Stage, replay: Replay, gain: float) -> Iterator[tuple[str, An
             poses[i, frame] = np.hstack([data.xpos, data.xquat[:, XYZW]])
         for i, axis in enumerate(replay.axes):
             marks[i, frame] = stage.mark(axis)
-    for i, machine in enumerate(machines):
-        for body in range(stage.model.nbody):
+    for i, machine in enumerate(machines if replay.horizon else [MEASURED]):
+        for body in np.flatnonzero(stage.model.body_weldid).tolist():
             at, turned = np.split(poses[i, :, body], [3], axis=1)
             columns = rr.Transform3D.columns(translation=at, quaternion=turned)
             yield _body(stage, machine, body), columns
@@ -154,7 +161,7 @@ def _curves(axis: AxisReplay) -> dict[str, Mapping[str, Array]]:
     """The signals that an axis has, by what is drawn together with its unit."""
     units = axis.units
     every: dict[str, Mapping[str, Array]] = {
-        f"position ({units.position})": {
+        f"{units.words('position')} ({units.position})": {
             MEASURED: axis.measured, MODELLED: axis.modelled, SETPOINT: axis.setpoint,
         },
         f"{units.words('force')} of each effect ({units.force})": axis.forces,

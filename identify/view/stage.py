@@ -144,11 +144,12 @@ def shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Array]]:
             yield i, shape, rgba
 
 
-def eye(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Where the first camera of the model stands; without one, where MuJoCo's would."""
+def camera(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, float]:
+    """Where the first camera of the model stands, or MuJoCo's, and degrees from top to bottom."""
     if model.ncam:
-        return np.array(data.cam_xpos[0])
-    return np.array(model.stat.center + 1.5 * model.stat.extent * np.array([0.5, -0.7, 0.5]))
+        return np.array(data.cam_xpos[0]), float(model.cam_fovy[0])
+    away = 1.5 * model.stat.extent * np.array([0.5, -0.7, 0.5])
+    return np.array(model.stat.center + away), 45.0
 
 
 def _colour(model: mujoco.MjModel, geom: int) -> Array:

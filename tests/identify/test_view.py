@@ -195,17 +195,21 @@ def test_an_arm_whose_shapes_are_not_there_is_drawn_as_rods() -> None:
     assert Stage.of(jointed(own)).model.ngeom == 1
 
 
+def of_kind(kind: str) -> Replay:
+    """A short log beside its model: an arm, a machine of axes, or one drawn by a mesh."""
+    if kind == "arm":
+        return jointed(ARM)
+    plain = machine(MACHINES["linear" if kind == "mesh" else kind][0])
+    if kind == "mesh":
+        points = np.random.default_rng(1).normal(size=(60, 3)).ravel()
+        mjcf = MESH.format(points=" ".join(map(str, points)))
+        plain = replace(plain, mjcf=mjcf, mjcf_name="mesh.xml")
+    return replay(plain, simulate(plain, "tracking", seed=2, duration=1.5), "log")
+
+
 @pytest.mark.parametrize("kind", ["mesh", "arm", *MACHINES])
 def test_each_body_of_the_page_is_where_mujoco_has_it(kind, chrome, tmp_path) -> None:
-    if kind == "arm":
-        what = jointed(ARM)
-    else:
-        plain = machine(MACHINES["linear" if kind == "mesh" else kind][0])
-        if kind == "mesh":
-            points = np.random.default_rng(1).normal(size=(60, 3)).ravel()
-            mjcf = MESH.format(points=" ".join(map(str, points)))
-            plain = replace(plain, mjcf=mjcf, mjcf_name="mesh.xml")
-        what = replay(plain, simulate(plain, "tracking", seed=2, duration=1.5), "log")
+    what = of_kind(kind)
     write_page(tmp_path / "page.html", what, 1.0, 1.0)
     found = found_in(chrome, tmp_path / "page.html", """
     seek(0.7 * duration);
@@ -243,6 +247,7 @@ def test_what_cannot_be_shown_is_one_line(folder, monkeypatch) -> None:
         ("z.toml --html p.html", "has the axes x, y, the model c"),
         ("--html p.txt", ".html file"),
         ("--video l.mcap", "give another name"),
+        ("--rerun r.html", "r.html: Rerun opens an .rrd file"),
     ):
         assert said in refusal("view", "l.mcap", *command.split(), folder=folder)
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -277,6 +282,50 @@ def test_a_video_has_pictures_that_differ(folder) -> None:
     assert len(pictures) == 3
     assert all(picture[:720].std() > 10 for picture in pictures)
     assert np.abs(np.diff(pictures[:, :720].astype(int), axis=0)).max() > 50
+
+
+def test_a_recording_without_rerun_is_one_line(folder, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    monkeypatch.delitem(sys.modules, "identify.view.rerun", raising=False)
+    said = refusal("view", "l.mcap", "--rerun", "r.rrd", folder=folder)
+    assert said.startswith("twin: --rerun needs rerun-sdk, which is not here; pip install")
+
+
+@pytest.mark.parametrize("kind", ["mesh", "arm", "rotary", "log alone"])
+def test_a_recording_of_rerun_holds_the_replay(kind, log, tmp_path) -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk is not installed (extra rerun)")
+    from rerun.chunk import RrdReader
+
+    from identify.view.rerun import write_recording
+
+    what = replay(None, log, "log") if kind == "log alone" else of_kind(kind)
+    write_recording(tmp_path / "r.rrd", what, 3.0, 1.0)
+    parts = {p.entity_path: p for p in RrdReader(tmp_path / "r.rrd").stream() if not p.is_static}
+
+    def column(path: str, name: str) -> np.ndarray:
+        values = parts[path].to_record_batch().column(name)
+        return np.array((values.cast("int64") if name == "time" else values).to_pylist())
+
+    stage, frame = Stage.of(what), len(what) // 2
+    stage.pose(what, frame, 3.0)
+    machines = {"measured": stage.data} | ({"modelled": stage.ghost} if what.horizon else {})
+    assert {path.split("/")[2] for path in parts if path.startswith("/machine/")} >= set(machines)
+    for name, data in machines.items():
+        for body in np.flatnonzero(stage.model.body_weldid):
+            path = f"/machine/{name}/" + (stage.model.body(body).name or rf"body\ {body}")
+            time, places = column(path, "time"), column(path, "Transform3D:translation")
+            turned = column(path, "Transform3D:quaternion")[frame, 0]
+            np.testing.assert_allclose(
+                1e-9 * time, what.start + np.arange(len(what)) / what.rate, atol=1e-8
+            )
+            np.testing.assert_allclose(places[frame, 0], data.xpos[body], atol=1e-6)
+            np.testing.assert_allclose(np.roll(turned, 1), data.xquat[body], atol=1e-6)
+    for axis, own in what.axes.items():
+        label = rf"{own.units.words('position')}\ \({own.units.position}\)"
+        values = column(f"/signals/{axis}/{label}/measured", "Scalars:scalars")
+        np.testing.assert_array_equal(values[:, 0], own.measured)
+        effects = [p for p in parts if p.startswith(f"/signals/{axis}/") and r"\ effect\ " in p]
+        assert {path.split("/")[-1] for path in effects} == set(own.forces)
 
 
 def test_keys_move_the_replay() -> None:
