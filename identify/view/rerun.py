@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -37,11 +38,14 @@ XYZW = [1, 2, 3, 0]  # a quaternion of Rerun, in one of MuJoCo
 
 def write_recording(path: Path, replay: Replay, gain: float, speed: float) -> None:
     """Write the replay as .rrd; gain: of the differences drawn; speed: 1 is real time."""
-    stage, recording = Stage.of(replay), rr.RecordingStream("twin")
+    drawn = "at true size" if gain == 1.0 else f"differences drawn {gain:g} times as large"
+    # The viewer keeps one layout by this name, so that each log and gain has one of its own.
+    known = hashlib.sha256(f"{replay.title} {drawn}".encode()).hexdigest()[:8]
+    stage, recording = Stage.of(replay), rr.RecordingStream(f"twin-{known}")
     times = [rr.TimeColumn(TIME, duration=replay.start + np.arange(len(replay)) / replay.rate)]
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "made.rrd"
-        recording.save(made, _layout(stage, replay, gain, speed))
+        recording.save(made, _layout(stage, replay, drawn, speed))
         recording.send_recording_name(replay.title)
         for name, looks in _shapes(stage, replay):
             recording.log(name, *looks, static=True)
@@ -58,8 +62,8 @@ def write_recording(path: Path, replay: Replay, gain: float, speed: float) -> No
         write_atomically(path, made.read_bytes())
 
 
-def _layout(stage: Stage, replay: Replay, gain: float, speed: float) -> Any:
-    """The machine, and below it the signals of the axis whose tab is chosen."""
+def _layout(stage: Stage, replay: Replay, drawn: str, speed: float) -> Any:
+    """The machine, named as it is drawn; below it, by tabs, the signals of each axis."""
     linked = rrb.archetypes.TimeAxis(link="LinkToGlobal")
     tabs = [
         rrb.Grid(
@@ -74,7 +78,6 @@ def _layout(stage: Stage, replay: Replay, gain: float, speed: float) -> Any:
     look = rrb.EyeControls3D(
         position=centre + nearer * (seen_from - centre), look_target=centre, eye_up=(0.0, 0.0, 1.0)
     )
-    drawn = "true size" if gain == 1.0 else f"differences drawn {gain:g} times as large"
     machine = rrb.Spatial3DView(
         origin=MACHINE, name=drawn, background=SKY, line_grid=False, eye_controls=look
     )
