@@ -85,19 +85,20 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
         if abs(np.mean(np.sign(columns[1]))) > ONE_WAY:
             columns = _without(columns, "constant")  # it would be the friction of that way
         found = _with_friction(columns, force)
+        least = LEAST_INERTIAL * float(np.std(force)) / max(float(np.std(columns[0])), 1e-300)
         mass = found.sure("mass")
-        told = abs(mass) * float(np.std(columns[0])) > LEAST_INERTIAL * float(np.std(force))
-        if told and mass > 0.0:
+        if mass > least:
             break
+    against = _with_friction(columns, -force).sure("mass")  # whose friction would push
     coulomb = found.sure("coulomb")
     static = _static(motions, found, place)
     return FirstValues(
-        mass=mass if told and mass > 0.0 else None,
+        mass=mass if mass > least else None,
         coulomb=coulomb,
         viscous=found.sure("viscous"),
         constant=found.sure("constant"),
         static=static if static is not None and static > MORE * coulomb > 0.0 else None,
-        reversed=min(mass, 0.0) if told else 0.0,
+        reversed=-against if mass <= least < against else 0.0,
     )
 
 
