@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.effect import Effect, Parameter
-from twin.model.machine import AxisModel
+from twin.effect import Parameter
+from twin.model.machine import AxisModel, Fitted
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def write(
         by_effect.setdefault(c.effect, {})[c.parameter.name] = float(value)
     mass = by_effect.pop("", {}).get(axis.mass_parameter.name, axis.mass)
     effects = tuple(
-        replace(f, values=_ordered(f.effect, {**f.values, **by_effect[f.effect.name]}))
+        replace(f, values=_ordered(f, {**f.values, **by_effect[f.effect.name]}))
         if f.effect.name in by_effect
         else f
         for f in axis.effects
@@ -71,7 +71,14 @@ def write(
     return replace(axis, mass=mass, effects=effects)
 
 
-def _ordered(effect: Effect, values: dict[str, float]) -> dict[str, float]:
-    """The values with each held one raised to the one it may not fall below (Fs >= Fc)."""
-    floors = {p.name: values[p.at_least] for p in effect.parameters if p.at_least}
-    return {name: max(value, floors.get(name, value)) for name, value in values.items()}
+def _ordered(before: Fitted, values: dict[str, float]) -> dict[str, float]:
+    """The values with each held one raised to the one it may not fall below (Fs >= Fc).
+
+    One that is held at that follows it: the logs did not tell the two apart.
+    """
+    floors = {p.name: p.at_least for p in before.effect.parameters if p.at_least}
+    out = dict(values)
+    for name, floor in floors.items():
+        follows = name in before.fixed and before.values[name] == before.values[floor]
+        out[name] = values[floor] if follows else max(values[name], values[floor])
+    return out

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,6 +134,18 @@ def test_every_tie_of_the_catalogue_is_kept_by_writing():
 
 def step(number: int) -> HistoryStep:
     return HistoryStep("add", f"effect{number}", "x", 5.0 + number, 4.0, None, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("static", "held", "then"), [(2.0, True, 1.5), (2.5, True, 2.5), (2.0, False, 2.0)]
+)
+def test_a_static_friction_that_is_held_at_the_dry_one_follows_it(
+    static: float, held: bool, then: float
+) -> None:
+    law = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 2.0, "Fs": static})
+    axis = AxisModel(1.0, effects=(replace(law, fixed=frozenset({"Fs"} if held else ())),))
+    dry = [c for c in free_parameters(axis) if c.parameter.name == "Fc"]
+    assert write(axis, dry, [1.5])["coulomb_viscous"].values["Fs"] == then
 
 
 def test_history_grows_at_its_end_and_nothing_else_changes():
