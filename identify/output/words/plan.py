@@ -51,8 +51,8 @@ def _run(t: SimulatedExperiment) -> str:
 
 def _rival(t: SimulatedExperiment) -> str:
     """What the explanation that is wrong would leave."""
-    left, ratio = quantity(t.difference, t.units.force), number(t.difference / t.floor)
-    return f"the rival leaves {left} RMS unexplained, {ratio} times the noise floor"
+    left, noise = (quantity(size, t.units.force) for size in (t.difference, t.floor))
+    return f"the rival leaves {left} RMS unexplained, noise on this motion is {noise}"
 
 
 def next_step_in_words(plan: Plan) -> str:
