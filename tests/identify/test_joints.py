@@ -210,23 +210,35 @@ def balanced(q, v):
     return friction(q, v) - [0.0, 0.0, 0.6 * np.sin(q[2] + 0.3)]
 
 
-def test_the_planned_experiment_tells_apart_what_others_of_a_joint_do_not(folder):
+def ran(model, experiment, seed):
+    """The log of the arm with a counterbalance, on a planned motion."""
+    setpoint = setpoint_of(experiment, model, 0)
+    return arm_log(seed, balanced, planned=setpoint.part(0, len(setpoint)))
+
+
+@pytest.fixture(scope="module")
+def planned(folder):
     model, rivals = load_model(folder / "arm.toml"), [load_catalogue()[n] for n in RIVALS]
-
-    def ran(experiment, seed):
-        setpoint = setpoint_of(experiment, model, 0)
-        return arm_log(seed, balanced, planned=setpoint.part(0, len(setpoint)))
-
-    poor, held = (
-        {n: ran(Passes("elbow", span=0.5, speed=0.3, repeats=2), s)} for s, n in enumerate("ab")
-    )
+    short = Passes("elbow", span=0.5, speed=0.3, repeats=2)
+    poor, held = ({name: ran(model, short, seed)} for seed, name in enumerate("ab"))
     found = plan(model, poor, held, between=rivals, axis="elbow", duration=8.0)
+    return model, Catalogue(rivals), poor, held, found
+
+
+def test_an_experiment_is_planned_that_decides_between_laws_of_a_joint(planned):
+    *_, found = planned
     assert found.decides
+    assert kind_of(found.chosen.experiment) == "passes"
+
+
+@pytest.mark.slow
+def test_the_planned_experiment_tells_apart_what_others_of_a_joint_do_not(planned):
+    model, rivals, poor, held, found = planned
     told = {}
     for experiment in (Tracking(8.0), found.chosen.experiment):
-        made = fit(model, {**poor, "c": ran(experiment, 2)}, held)
+        made = fit(model, {**poor, "c": ran(model, experiment, 2)}, held)
         elbow = made.fits["elbow"], made.datasets["elbow"]
-        one = diagnose_axis(*elbow, Catalogue(rivals))
+        one = diagnose_axis(*elbow, rivals)
         told[kind_of(experiment)] = one.named, one.ambiguous_with
     assert told == {"tracking": (("gravity",), ("spring",)), "passes": (("gravity",), ())}
 
