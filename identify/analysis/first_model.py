@@ -49,10 +49,9 @@ NAMES = ("mass", "coulomb", "viscous", "constant")  # of the first columns; othe
 class FirstValues:
     """mass kg, None where the logs do not tell it; coulomb N, viscous N s/m, 0 where there is none.
 
-    reversed: kg less than 0, of which force and motion are; 0 where they are of no such mass.
-
     constant: N that the command takes beside the others, 0 where the logs do not ask for it.
     static: N, None where the axis does not break away from rest by more than its Coulomb friction.
+    reversed: kg less than 0, of which force and motion are; 0 where they are of no such mass.
     """
 
     mass: float | None
@@ -89,7 +88,8 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
         mass = found.sure("mass")
         if mass > least:
             break
-    against = _with_friction(columns, -force).sure("mass")  # whose friction would push
+    # As it is, its friction would push.
+    against = 0.0 if mass > least else _with_friction(columns, -force).sure("mass")
     coulomb = found.sure("coulomb")
     static = _static(motions, found, place)
     return FirstValues(
@@ -98,7 +98,7 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
         viscous=found.sure("viscous"),
         constant=found.sure("constant"),
         static=static if static is not None and static > MORE * coulomb > 0.0 else None,
-        reversed=-against if mass <= least < against else 0.0,
+        reversed=-against if against > least else 0.0,
     )
 
 

@@ -99,6 +99,12 @@ def change(before: float, after: float, unit: str | Scale) -> tuple[str, str]:
     return first, f"{second} {scale.unit}".rstrip()
 
 
+def each_with_unit(before: float, after: float, unit: str) -> tuple[str, str]:
+    """The same where words come between them, so that each has the unit."""
+    first, second = change(before, after, unit)
+    return first + second[second.index(" ") :], second
+
+
 def arrow(before: float, after: float, unit: str) -> str:
     """E.g. "73.6 -> 7.25 mN"."""
     return " -> ".join(change(before, after, unit))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +22,12 @@ from identify.dataset.prepared_log import (
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import error_on
 from identify.estimation.force_balance import residual
-from identify.validation.free_run import drift_of_noise, free_run, rms_error
+from identify.validation.free_run import (
+    drift_of_noise,
+    free_run,
+    left_out_if_it_cannot_run,
+    rms_error,
+)
 from identify.validation.misfit_maps import (
     MisfitMap,
     Region,
@@ -33,14 +37,11 @@ from identify.validation.misfit_maps import (
     worst_regions,
 )
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
-from twin.errors import CannotRun
 from twin.logs import write_topics
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import spread
 from twin.signals import Array
-
-LOGGER = logging.getLogger("identify")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,13 +144,11 @@ def position_errors(
         logs = {name: parts for name, parts in logs.items() if len(parts) == len(model.axes)}
 
     def run(parts: Mapping[str, PreparedLog]) -> dict[str, tuple[float, float]]:
-        try:
+        with left_out_if_it_cannot_run(next(iter(parts.values())).motion.name):
             own = free_run(model, parts)
             noise = drift_of_noise(model, parts, own)
-        except CannotRun as error:
-            LOGGER.warning("no free run on %s: %s", next(iter(parts.values())).motion.name, error)
-            return {}
-        return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
+            return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
+        return {}
 
     errors: dict[str, dict[str, float]] = {a: {} for a in found}
     floors: dict[str, dict[str, float]] = {a: {} for a in found}

@@ -8,7 +8,8 @@ wrong force of the model.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -137,10 +138,17 @@ def errors_of_both(
     if after.is_imposed:
         return None, None
     name, log = next(iter(by_log(prepared).items()))
-    try:
+    with left_out_if_it_cannot_run(name):
         runs = (free_run(before, log), free_run(after, log), free_run(after, log, MujocoSimulator))
+        was, now, replayed = (rms_error(run, axis) for run in runs)
+        return (was, now), replayed
+    return None, None
+
+
+@contextmanager
+def left_out_if_it_cannot_run(name: str) -> Iterator[None]:
+    """Go on behind a free run on a log that a model cannot make, and say why."""
+    try:
+        yield
     except CannotRun as error:
         LOGGER.warning("no free run on %s: %s", name, error)
-        return None, None
-    was, now, replayed = (rms_error(run, axis) for run in runs)
-    return (was, now), replayed

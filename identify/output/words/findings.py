@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.dataset.dataset import Role
-from identify.output.numbers import Scale, change, number, percent, quantity
+from identify.output.numbers import Scale, each_with_unit, number, percent, quantity
 from identify.output.words.commands import fitted_curves
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis
@@ -45,8 +45,7 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
 def _explained(finding: Finding) -> str:
     tested = finding.tested
     error = "test error" if tested.on is Role.TEST else f"error on the {tested.on.value} logs"
-    before, after = change(tested.before, tested.after, finding.unit)
-    before += after[after.index(" ") :]
+    before, after = each_with_unit(tested.before, tested.after, finding.unit)
     what, without, with_it = finding.effect, "without it", "with it"
     if finding.kind is FindingKind.RESEMBLES:
         shape = "in another shape; that law"

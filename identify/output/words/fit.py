@@ -18,7 +18,7 @@ from identify.estimation.intervals import (
     OpenSided,
 )
 from identify.estimation.simulated_motion import MotionFit
-from identify.output.numbers import Scale, arrow, change, number, percent, quantity
+from identify.output.numbers import Scale, arrow, change, each_with_unit, number, percent, quantity
 from identify.results.results import FitResult, SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
@@ -241,8 +241,7 @@ def refit_in_words(refit: Refit) -> str | None:
     if not refit.changes:
         return None
     error = units_of(refit.unit).words("force error")
-    before, after = change(refit.given, refit.refitted, refit.unit)
-    before += after[after.index(" ") :]
+    before, after = each_with_unit(refit.given, refit.refitted, refit.unit)
     changes = ", ".join(map(change_in_words, refit.changes))
     return f"with the given values the {error} is {before}, after the fit {after}: {changes}"
 

@@ -12,6 +12,7 @@ from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.output.numbers import Scale, number, quantity
 from twin.experiments.file import in_short
+from twin.experiments.kinds import kind_of
 
 
 def in_order(plan: Plan) -> list[SimulatedExperiment]:
@@ -105,7 +106,7 @@ def all_not_run_in_words(not_run: Sequence[NotRun]) -> list[str]:
         alike.setdefault(_why(one), []).append(one)
 
     def kinds(same: list[NotRun]) -> str:
-        count = Counter(in_short(n.experiment, n.units).partition(":")[0] for n in same)
+        count = Counter(kind_of(n.experiment) for n in same)
         return ", ".join(f"{number} {kind}" for kind, number in count.items())
 
     return [
