@@ -79,6 +79,7 @@ class Browser:
         self.call("Page.navigate", url=address)
         while not self._loaded(address):  # what is heard first may be of the page before
             self._hear()
+        self.run("await frame()")  # its scripts fill a part of it in the frame after loading
 
     def _loaded(self, address: str) -> bool:
         there = False
