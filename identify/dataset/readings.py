@@ -108,7 +108,7 @@ def _passed(readings: Array, step: float) -> tuple[Array, Array]:
     on = np.concatenate([[-1], np.flatnonzero(~back), [-1]])  # the last of a list where none is
     if len(on) == 2:
         return times, middle
-    after = np.searchsorted(on[1:-1], np.arange(len(apart)))
+    after = np.cumsum(np.append(0, ~back[:-1]))  # how many go on before each
     longest = np.append(apart, np.inf)
     nearest = np.minimum(longest[on[after]], longest[on[after + 1]])
     group = np.concatenate([[0], np.cumsum(~(back & (apart < nearest)))])

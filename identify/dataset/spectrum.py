@@ -91,7 +91,7 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
         weight = 1.0 / (1.0 + above**2)
         before = levels
         levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
-        if np.allclose(levels, before, rtol=RESTING, atol=0.0):
+        if (np.abs(levels - before) <= RESTING * before).all():
             break
         model = np.maximum(shapes @ levels, least[0])
     return levels
@@ -102,9 +102,9 @@ def _not_negative(columns: Array, wanted: Array) -> Array:
     square, met = columns.T @ columns, columns.T @ wanted
     size = np.sqrt(square.diagonal())
     gains, kept = np.zeros(len(size)), np.flatnonzero(size)
+    unit, aim = square / np.outer(size, size), met / size
     while len(kept):
-        unit = square[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
-        found = np.linalg.lstsq(unit, met[kept] / size[kept], rcond=None)[0]
+        found = np.linalg.lstsq(unit[kept][:, kept], aim[kept], rcond=None)[0]
         if found.min() >= 0.0:
             gains[kept] = found / size[kept]
             break

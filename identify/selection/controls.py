@@ -238,14 +238,23 @@ class _Tried:
         """Part of the error above the floor that a linear step takes, the smaller of two groups."""
         rng = None if false is None else (false[0], np.random.default_rng(false[1]))
         blocks = self.training.products(rng)
-        steps, without = _steps(blocks), _steps(self.training.own)
+        steps, without = _steps(blocks), self._without
         own = _parts(self.training, blocks, steps, without, self.quiet)
         if self.other is None:
             left = _steps(blocks, leave_out=True)
-            held = _steps(self.training.own, leave_out=True)
-            return min(own, _parts(self.training, blocks, left, held, self.quiet))
+            return min(own, _parts(self.training, blocks, left, self._left_out, self.quiet))
         there = self.other.products(rng)
         return min(own, _parts(self.other, there, steps, without, self.other_quiet))
+
+    @cached_property
+    def _without(self) -> Array:
+        """Step of the base alone."""
+        return _steps(self.training.own)
+
+    @cached_property
+    def _left_out(self) -> Array:
+        """The same by blocks, each by the others."""
+        return _steps(self.training.own, leave_out=True)
 
 
 def _steps(products: Array, leave_out: bool = False) -> Array:
