@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import smoothed_over
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Errors, Fit, fit_axis
@@ -310,7 +309,7 @@ class _Body:
         first = bodies.readings[0]
         key = (first.__array_interface__["data"][0], len(first))
         if key not in self._known:
-            motion = bodies.along(log.motion.sample_period)
+            motion = bodies.along()
             every = self.mechanism.per_unit(self.index, *motion)
             self._known[key] = every[:, :, self.mechanism.moved_by(self.index)]
         return np.asarray(self._known[key][:, :, self.axes.index(log.motion.axis)])
@@ -328,8 +327,7 @@ class _Body:
             motion = log.motion
             assert motion.bodies is not None
             momentum, force = np.einsum("k,pkn->pn", change, self._per_unit(log))
-            samples = smoothed_over(motion.sample_period, len(momentum))
-            bodies = motion.bodies.with_more(momentum, force, samples, motion.sample_period)
+            bodies = motion.bodies.with_more(momentum, force)
             command = log.command + self.forces(log) @ change
             return replace(log, motion=replace(motion, bodies=bodies), command=command)
 

@@ -13,6 +13,7 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import NoiseFloor
 from identify.dataset.prepared_log import PreparedLog, total_force
+from identify.dataset.track import Blocks
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
@@ -138,8 +139,8 @@ def built_motion(name: str = "run", seconds: float = 3.0, seed: int = 1, slow: f
     u = 5.3 * a + 0.31 * np.sign(v) + 0.53 * v + 0.02 * rng.standard_normal(len(t))
     others = np.stack([0.3 * np.roll(x, 700), 0.3 * np.roll(v, 700), 0.3 * np.roll(a, 700)])
     return Motion(
-        name=name, axis="x", signals=np.stack([x, v, u]), others=others, period=PERIOD, start=0.0,
-        sample_period=PERIOD, position_noise=3e-9, raw=np.stack([v, u]),
+        name=name, axis="x", track=Blocks(np.stack([x, v, u]), np.stack([v, u])), others=others,
+        period=PERIOD, start=0.0, sample_period=PERIOD, position_noise=3e-9,
     )  # fmt: skip
 
 
@@ -147,7 +148,7 @@ def pushed(motion: Motion, law: Fitted) -> Motion:
     """The motion with the command that it takes against one force more."""
     force = total_force(axis_table({"": AxisModel(5.3, HARDWARE, (law,))}), motion)
     x, v, u = motion.signals
-    return replace(motion, signals=np.stack([x, v, u - force]), raw=np.stack([v, u - force]))
+    return replace(motion, track=Blocks(np.stack([x, v, u - force]), np.stack([v, u - force])))
 
 
 def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -> Dataset:

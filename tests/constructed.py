@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.track import Blocks
 from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation
@@ -67,7 +68,7 @@ def ridden(command: Callable[[Motion], Array], duration: float = 6.0) -> Motion:
     m, v = motion.position, motion.velocity
     force = 1.3 * np.gradient(v, 1e-3) + 0.7 * np.sign(v) + 0.9 * v + 0.2 - 3.0 * m + 40.0 * m**3
     u = force + command(motion)
-    return replace(motion, signals=np.stack([m, v, u]), raw=np.stack([motion.raw[0], u]))
+    return replace(motion, track=Blocks(np.stack([m, v, u]), np.stack([motion.raw[0], u])))
 
 
 def two_waves(samples: int, rate: float = 1000.0) -> Setpoint:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identify.dataset.bodies import bodies_along
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, bodies_along, motion_of
+from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import stands
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction

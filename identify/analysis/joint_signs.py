@@ -16,7 +16,8 @@ from math import pi
 import numpy as np
 
 from identify.analysis.first_model import LENGTHS, friction_left
-from identify.dataset.motion import bodies_along, motion_of
+from identify.dataset.bodies import bodies_along
+from identify.dataset.motion import motion_of
 from twin.checks import moves
 from twin.logs import Log
 from twin.model.machine import MachineModel

@@ -99,7 +99,7 @@ def _other_joints(motion: Motion) -> tuple[float, ...]:
     """Numbers of the other joints of a mechanism."""
     if motion.bodies is None:
         return ()
-    return tuple(float(j) for j in range(len(motion.bodies.speeds)) if j != motion.bodies.index)
+    return tuple(float(j) for j in range(len(motion.bodies.readings)) if j != motion.bodies.index)
 
 
 def lines(motions: Sequence[Motion]) -> tuple[float, ...]:

@@ -86,6 +86,11 @@ class Dataset:
         fit, holdout, test = (tuple(islice(others, len(self.having(role)))) for role in Role)
         return replace(self, fit=fit, holdout=holdout, test=test)
 
+    def forget(self) -> None:
+        """Let go of what is made of the columns of its logs, where these are held."""
+        for log in (*self.logs, *self.__dict__.get("heads", ())):
+            log.motion.forget()
+
     @property
     def chosen_on(self) -> Role:
         """Role of the logs that choose; without selection logs they are the training logs."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.motion import SMOOTHED, Motion
+from identify.dataset.track import Blocks
 from twin.core.walks import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table
@@ -119,7 +120,7 @@ def _behind(sensing: _Valued, motion: Motion) -> tuple[Motion, Array]:
     for block, at_samples in zip(blocks, (error, rate), strict=False):
         block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)
     raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
-    return replace(motion, signals=blocks, raw=raw), rate
+    return replace(motion, track=Blocks(blocks, raw)), rate
 
 
 def reading_error(

@@ -1,9 +1,4 @@
-"""A log seen as motion of one axis: equally spaced means, so that nothing is differentiated twice.
-
-The command u_k is held over [t_k, t_k + dt), so the force belongs to the middle of the sample; the
-position there is (x_k + x_{k+1})/2 and the velocity (x_{k+1} - x_k)/dt. Means over blocks of whole
-samples keep these relations exact.
-"""
+"""A log seen as motion of one axis: means over blocks of whole samples, and their readings."""
 
 from __future__ import annotations
 
@@ -14,6 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from identify.dataset.bodies import Bodies
 from identify.dataset.readings import (
     ENOUGH,
     resolution_of,
@@ -23,9 +19,10 @@ from identify.dataset.readings import (
     together,
 )
 from identify.dataset.test_function import LEAST_BLOCKS
+from identify.dataset.track import Blocks, Columns, Track, in_blocks, samples_of
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
-from twin.model.machine import MOST_AXES_OF_A_PAIR, MachineModel
+from twin.model.machine import MOST_AXES_OF_A_PAIR
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise
 
@@ -36,7 +33,6 @@ SHORTEST_BLOCK = 1e-3  # s
 LONGEST_BLOCK = 1e-2  # s
 REST_SPEED = 1e-3  # of the highest; below, an axis may stick, and no velocity need be known better
 SHORTEST_LOG = 0.5  # s, a few test functions
-OF_JOINT = 0.02  # s, over which a joint's position is a parabola that tells its velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,81 +52,40 @@ class OtherAxis:
     def signals(self) -> Array:
         """Position, velocity and acceleration (3, n), in units."""
         x = self.readings
-        position, velocity, _ = _blocks(*_midpoints(x, x, self.sample_period), self.samples)
+        position, velocity, _ = in_blocks(x, x, self.samples, self.sample_period)
         return np.stack([position, velocity, rate(velocity, self.samples * self.sample_period)])
 
     def during(self, blocks: slice) -> OtherAxis:
         """The same of some blocks."""
-        first, end, _ = blocks.indices((len(self.readings) - 1) // self.samples)
-        part = self.readings[first * self.samples : end * self.samples + 1]
-        return replace(self, readings=part)
-
-
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """What the bodies of a mechanism take of one of its joints, (n,) each between a log's samples.
-
-    momentum: N s, beyond mass x velocity. force: N, what they take beyond the change of momentum.
-    load: N, all that they take, smoothed. readings: m, of each joint (n + 1,), at the ends, as the
-    log holds them; speeds (n_axes, n): m/s, smoothed, of all joints; index: which of them this is.
-    """
-
-    momentum: Array
-    force: Array
-    load: Array
-    readings: tuple[Array, ...]
-    speeds: Array
-    index: int
-
-    def along(self, period: float) -> tuple[Array, Array, Array]:
-        """Positions, velocities and smoothed velocities (n_axes, n) of all joints, m and m/s.
-
-        period: s, of the readings.
-        """
-        readings = np.stack(self.readings)
-        return _middle(readings), between(readings, period), self.speeds
-
-    def during(self, samples: slice) -> Bodies:
-        """The same of some samples."""
-        first, end, _ = samples.indices(len(self.momentum))
-        momentum, force, load = (a[first:end] for a in (self.momentum, self.force, self.load))
-        readings = tuple(r[first : end + 1] for r in self.readings)
-        return Bodies(momentum, force, load, readings, self.speeds[:, first:end], self.index)
-
-    def with_more(self, momentum: Array, force: Array, samples: int, period: float) -> Bodies:
-        """The same where the bodies take more, (n,) N s and N; smoothed over so many samples."""
-        load = force + local_parabola(momentum, samples, derivative=1, period=period)
-        more = {"momentum": momentum, "force": force, "load": load}
-        return replace(self, **{name: getattr(self, name) + own for name, own in more.items()})
+        at = samples_of(blocks, self.samples, (len(self.readings) - 1) // self.samples)
+        return replace(self, readings=self.readings[at.start : at.stop + 1])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Motion of one axis over one log, in blocks.
 
-    name: of the log. signals (3, n): position m, velocity m/s, command N. others (3, n): position,
-    velocity, acceleration of the other axis (zero where there is none, or more than one). period:
-    s, of a block. start: s, middle of the first block. sample_period: s, of the log.
-    position_noise: m rms. raw (2, n * samples a block): velocity m/s and command N at the log's own
-    rate. time_origin: s, when the log began, by the phase of what repeats in time. follows: whether
-    the position follows a logged setpoint; None where none was logged. units, other_units: of the
-    axis and of the other one, by which m, N and so on are to be read. beside: on a machine with
-    more than two axes the others, by name. velocity_weight: 1, of a measured velocity beside the
-    readings (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the
-    readings err along the track (identify.dataset.readings). ahead: s, by which the command
-    was moved ahead of how it was logged. bodies: of a joint of a mechanism, over as many samples as
-    raw; None for a plain axis, whose mass is all that it moves.
+    name: of the log. track: its signals. others (3, n): position, velocity, acceleration of the
+    other axis (zero where there is none, or more than one). period: s, of a block. start: s, middle
+    of the first block. sample_period: s, of the log. position_noise: m rms. time_origin: s, when
+    the log began, by the phase of what repeats in time. follows: whether the position follows a
+    logged setpoint; None where none was logged. units, other_units: of the axis and of the other
+    one, by which m, N and so on are to be read. beside: on a machine with more than two axes the
+    others, by name. velocity_weight: 1, of a measured velocity beside the readings
+    (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the readings
+    err along the track (identify.dataset.readings). ahead: s, by which the command was moved ahead
+    of how it was logged. bodies: of a joint of a mechanism, over as many samples as raw; None for a
+    plain axis, whose mass is all that it moves.
     """
 
     name: str
     axis: str
-    signals: Array
+    track: Track
     others: Array
     period: float
     start: float
     sample_period: float
     position_noise: float
-    raw: Array
     time_origin: float = 0.0
     follows: bool | None = None
     units: AxisUnits = LINEAR
@@ -162,14 +117,13 @@ class Motion:
         return round((self.start - 0.5 * self.period) / self.sample_period)
 
     def _of_blocks(self, blocks: slice) -> Motion:
-        samples = self.raw.shape[1] // self.signals.shape[1]
-        ends = [None if end is None else end * samples for end in (blocks.start, blocks.stop)]
+        count = self.signals.shape[1]
+        at = samples_of(blocks, self.raw.shape[1] // count, count)
         return replace(
             self,
-            signals=np.ascontiguousarray(self.signals[:, blocks]),
+            track=self.track.during(blocks),
             others=np.ascontiguousarray(self.others[:, blocks]),
-            raw=np.ascontiguousarray(self.raw[:, slice(*ends)]),
-            bodies=None if self.bodies is None else self.bodies.during(slice(*ends)),
+            bodies=None if self.bodies is None else self.bodies.during(at),
             beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
@@ -183,7 +137,26 @@ class Motion:
         """The same under another force (n * samples a block,) N, at the log's own rate."""
         signals = self.signals.copy()
         signals[2] = force.reshape(signals.shape[1], -1).mean(axis=1)
-        return replace(self, signals=signals, raw=np.stack([self.raw[0], force]))
+        return replace(self, track=Blocks(signals, np.stack([self.raw[0], force])))
+
+    def forget(self) -> None:
+        """Let go of what is made of a log's columns in memory, which is as long as they are."""
+        if isinstance(self.track, Columns):
+            self.track.forget()
+            if self.bodies is not None:
+                self.bodies.forget()
+            for name in ("smoothed_position", "unrippled", "rounding"):
+                self.__dict__.pop(name, None)
+
+    @property
+    def signals(self) -> Array:
+        """Position m, velocity m/s and command N, (3, n)."""
+        return self.track.signals
+
+    @property
+    def raw(self) -> Array:
+        """Velocity m/s and command N at the log's own rate, (2, n * samples a block)."""
+        return self.track.raw
 
     @property
     def time(self) -> Array:
@@ -332,22 +305,21 @@ def motion_of(
     ripples = ripple_periods(position) if ripples is None else ripples
     noise = white_noise(position - ripple(position, ripples))
     block = _block_samples(position, noise, log.period, longest_block)
-    force = log.axes[axis].force
-    signals = _blocks(*_midpoints(position, force, log.period), block)
+    whole = (len(position) - 1) // block * block
+    if bodies is not None:
+        position = bodies.readings[bodies.index]  # the same, which is in memory already
+    columns = Columns(position[: whole + 1], log.axes[axis].force[:whole], block, log.period)
     found = {
         a: OtherAxis(log.axes[a].position, block, log.period, log.axes[a].kind)
         for a in other_axes(log, axis, machine)
     }
-    raw = signals[1:]  # in blocks of one sample
-    if block > 1:
-        raw = np.stack([between(position, log.period), force[:-1]])[:, : block * signals.shape[1]]
     several = len(found) > 1 or len(machine) > MOST_AXES_OF_A_PAIR
     other = None if several else next(iter(found.values()), None)
     return Motion(
         name=name,
         axis=axis,
-        signals=signals,
-        others=_none(signals.shape[1]) if other is None else other.signals,
+        track=columns.kept if bodies is None else columns,  # of joints there are many
+        others=_none(whole // block) if other is None else other.signals,
         period=block * log.period,
         start=0.5 * block * log.period,
         sample_period=log.period,
@@ -355,11 +327,10 @@ def motion_of(
         other_units=LINEAR if other is None else other.units,
         beside=found if several else {},
         position_noise=noise,
-        raw=raw,
         follows=_follows(log.axes[axis]),
         velocity_weight=weight,
         ripples=ripples,
-        bodies=None if bodies is None else bodies.during(slice(block * signals.shape[1])),
+        bodies=None if bodies is None else bodies.during(slice(whole)),
     )
 
 
@@ -395,63 +366,3 @@ def _block_samples(position: Array, noise: float, period: float, longest: float)
     quiet = np.sqrt(2.0) * noise / (REST_SPEED * fastest)
     most = int(longest / period * (1.0 + 8.0 * np.finfo(float).eps))
     return max(min(round(max(SHORTEST_BLOCK, quiet) / period), most), 1)
-
-
-def _midpoints(position: Array, force: Array, period: float) -> tuple[Array, Array, Array]:
-    return (
-        0.5 * (position[1:] + position[:-1]),
-        between(position, period),
-        force[:-1],
-    )
-
-
-def _blocks(position: Array, velocity: Array, force: Array, samples: int) -> Array:
-    whole = len(position) // samples * samples
-    stacked = np.stack([position[:whole], velocity[:whole], force[:whole]])
-    return np.ascontiguousarray(stacked.reshape(3, -1, samples).mean(axis=2))
-
-
-def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
-    """What the bodies take of each axis that is a joint; none for a machine of plain axes.
-
-    Of all joints together: each carries the others. The velocity, of which the momentum is made, is
-    the difference of the readings, as the weak form integrates it by parts; what depends on it
-    otherwise is small and of second order, and takes a smooth one.
-    The force residual of a joint is command - force - d/dt(mass x velocity + momentum). name: of
-    the log. Raises InputError where the log lacks one of the joints.
-    """
-    if not model.joints:
-        return {}
-    from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
-
-    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
-    for axis in mechanism.axes:
-        if axis not in log.axes:
-            raise InputError(
-                f"{name}: has no axis '{axis}', which is a joint of {model.mjcf_name}; the forces "
-                "of the others depend on its motion, so log it, or take the joint out of the file"
-            )
-    told = [log.axes[axis] for axis in mechanism.axes]
-    readings = tuple(together(a.position, a.columns.get("velocity"), log.period)[0] for a in told)
-    position = np.stack(readings)
-    samples = smoothed_over(log.period, position.shape[1])
-    smooth = local_parabola(position, samples, derivative=1, period=log.period)
-    velocity, speeds = between(position, log.period), _middle(smooth)
-    momentum, force = mechanism.along(_middle(position), velocity, speeds)
-    load = force + local_parabola(momentum, samples, derivative=1, period=log.period)
-    momentum -= mechanism.inertia[:, None] * velocity
-    return {
-        axis: Bodies(momentum[i], force[i], load[i], readings, speeds, i)
-        for i, axis in enumerate(mechanism.axes)
-    }
-
-
-def smoothed_over(period: float, count: int) -> int:
-    """Samples, odd, over which the motion of ``count`` samples of a joint is smoothed."""
-    samples = min(max(round(OF_JOINT / period), 5), count - 1)
-    return samples - (1 - samples % 2)
-
-
-def _middle(signals: Array) -> Array:
-    """Means (..., n - 1) of each sample and the next."""
-    return np.asarray(0.5 * (signals[..., 1:] + signals[..., :-1]))

@@ -13,6 +13,7 @@ from itertools import islice
 
 import numpy as np
 
+from identify.dataset.bodies import Bodies, bodies_along
 from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
@@ -23,7 +24,7 @@ from identify.dataset.given_logs import (
     require_one_kind,
     require_samples,
 )
-from identify.dataset.motion import LONGEST_BLOCK, Bodies, Motion, bodies_along, motion_of
+from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
@@ -77,6 +78,7 @@ def _prepared(model: MachineModel, given: Given, test_function: float | None) ->
             still = {log: why for _, names in found.values() for log in names}
             own = {log: along[name] for log, along in bodies.items() if name in along}
             out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=still)
+            out[name].forget()  # the next axis needs the memory
     if not out:
         raise nothing_moves(model.axes, given[Role.TRAINING].values())
     return out

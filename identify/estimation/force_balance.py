@@ -22,6 +22,7 @@ from identify.dataset.prepared_log import (
     total_force,
     total_forces,
 )
+from identify.dataset.track import Blocks
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.walks import averaged_columns, reading_columns
@@ -136,7 +137,7 @@ def _sharpened(means: Array, log: PreparedLog) -> Array:
 
 def _under(motion: Motion, force: Array) -> Motion:
     """A motion under another force (n,) N by blocks."""
-    return replace(motion, signals=np.stack([*motion.signals[:2], force]))
+    return replace(motion, track=Blocks(np.stack([*motion.signals[:2], force]), motion.raw))
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -389,8 +390,8 @@ def force_along(
     """
     signals = np.stack([position, velocity, np.zeros_like(velocity)])
     motion = Motion(
-        name="", axis="", signals=signals, others=np.zeros_like(signals), period=period, start=0.0,
-        sample_period=period, position_noise=0.0, raw=signals[1:],
+        name="", axis="", track=Blocks(signals, signals[1:]), others=np.zeros_like(signals),
+        period=period, start=0.0, sample_period=period, position_noise=0.0,
     )  # fmt: skip
     return total_force(axis_table({"": parts_of(axis, *kinds)}), motion)
 

@@ -17,8 +17,9 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.bodies import bodies_along
 from identify.dataset.drive import parts_of
-from identify.dataset.motion import SHORTEST_LOG, Motion, bodies_along, motion_of
+from identify.dataset.motion import SHORTEST_LOG, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import choose_test_function

@@ -14,6 +14,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, reading_error
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, total_force
+from identify.dataset.track import Blocks
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
@@ -179,10 +180,10 @@ def exemplary_motion() -> Motion:
     other = 0.5 * np.roll(position, len(position) // 7)
     speed = rate(other, PERIOD)
     others = np.stack([other, speed, rate(speed, PERIOD)])
+    signals = np.stack([position, velocity, command])
     return Motion(
-        name="exemplary", axis="x", signals=np.stack([position, velocity, command]), others=others,
+        name="exemplary", axis="x", track=Blocks(signals, signals[1:]), others=others,
         period=PERIOD, start=0.0, sample_period=PERIOD, position_noise=0.0,
-        raw=np.stack([velocity, command]),
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from identify.dataset.coordinates import lines, ripples
 from identify.dataset.spectrum import MOST_LINES, Record, find_lines, lines_in_time
+from identify.dataset.track import Blocks
 
 N = 6000
 
@@ -103,5 +104,5 @@ def test_a_ripple_of_the_reading_is_found_at_its_period():
         + 15.0 * rng.normal(size=len(m.time)) * (np.abs(m.velocity) < 0.03)
     )  # fmt: skip
     assert ripples([loud])[0] == pytest.approx(pitch, rel=3e-3)
-    still = replace(SHORT, signals=SHORT.signals * [[0.0], [1.0], [1.0]])
+    still = replace(SHORT, track=Blocks(SHORT.signals * [[0.0], [1.0], [1.0]], SHORT.raw))
     assert ripples([still]) == ()

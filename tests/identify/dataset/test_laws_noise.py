@@ -20,6 +20,7 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.dataset.spectrum import median_spectrum
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
+from identify.dataset.track import Blocks
 from identify.estimation.force_balance import residual
 from twin.checks import moves
 from twin.effect import LEAST
@@ -109,7 +110,7 @@ def test_what_the_model_explains_is_no_noise():
     assert np.std(acts) > 0.2
     middles = (np.arange(motion.raw.shape[1]) + 0.5) * motion.sample_period
     raw = motion.raw - np.stack([np.zeros(len(middles)), np.interp(middles, motion.time, acts)])
-    motion = replace(motion, raw=raw)
+    motion = replace(motion, track=Blocks(motion.signals, raw))
     known, unknown = (noise_of(a, motion).force for a in (axis, AxisModel(MASS)))
     assert known < 1.5 * 2.0 / 1000.0 * 0.01**2
     assert unknown > 20.0 * known
@@ -141,9 +142,9 @@ def test_the_rough_mass_is_exact_beside_dry_and_viscous_friction():
     m = moved(np.random.default_rng(11), 2.0, 1000.0)
     rate = np.gradient(m.velocity, m.period)
     u = 2.3 * rate + 0.7 * np.sign(m.velocity) + 0.4 * m.velocity - 0.9
-    pushed = replace(m, signals=np.stack([m.position, m.velocity, u]))
+    pushed = replace(m, track=Blocks(np.stack([m.position, m.velocity, u]), m.raw))
     assert inertia([pushed, pushed]) == pytest.approx(2.3, rel=2e-3)
-    pulled = replace(m, signals=np.stack([m.position, m.velocity, -u]))
+    pulled = replace(m, track=Blocks(np.stack([m.position, m.velocity, -u]), m.raw))
     assert inertia([pulled]) == pytest.approx(LEAST)  # the least mass that a model may have
 
 
@@ -156,7 +157,7 @@ def test_the_shortest_window_that_is_quiet_is_chosen():
         pulled = np.stack([log.motion.raw[0], log.motion.raw[1] + np.sqrt(0.5) * np.sin(8.0 * t)])
         signals = log.motion.signals.copy()
         signals[2] = pulled[1].reshape(len(log.motion.time), -1).mean(axis=1)
-        motion = replace(log.motion, raw=pulled, signals=signals)
+        motion = replace(log.motion, track=Blocks(signals, pulled))
         fine = [TestFunction.of_length(n, 1.0 / RATE) for n in TEST_FUNCTIONS]
         calm = [passed(w, size, 0.0) < QUIET * 0.5 for w in fine]
         wanted = TEST_FUNCTIONS[calm.index(True)] if any(calm) else TEST_FUNCTIONS[-1]

@@ -22,6 +22,7 @@ from identify.dataset.coordinates import excitation
 from identify.dataset.drive import actual_force, forces_lessened, reading_error, true_motion
 from identify.dataset.motion import SMOOTHED, Motion, motion_of
 from identify.dataset.test_function import TestFunction
+from identify.dataset.track import Blocks
 from identify.estimation.force_balance import averaged_force
 from twin.errors import InputError
 from twin.model.machine import AxisModel
@@ -191,9 +192,8 @@ def test_the_excitation_covers_all_motions():
 
 def test_the_dry_level_is_half_the_gap_between_the_directions():
     def pushed(velocity, command) -> Motion:
-        return replace(
-            SHORT, signals=np.stack([np.linspace(0, 1, len(velocity)), velocity, command])
-        )
+        signals = np.stack([np.linspace(0, 1, len(velocity)), velocity, command])
+        return replace(SHORT, track=Blocks(signals, signals[1:]))
 
     velocity = np.concatenate([np.full(300, 0.4), np.full(200, -0.4), np.full(500, 0.0079)])
     command = np.concatenate([np.full(300, 1.7), np.full(200, -0.5), np.full(500, 55.0)])

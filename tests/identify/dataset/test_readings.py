@@ -23,6 +23,7 @@ from identify.dataset.readings import (
     ripples_of_widest,
     together,
 )
+from identify.dataset.track import Blocks
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue
@@ -109,7 +110,8 @@ def _with_more_force(log: PreparedLog) -> PreparedLog:
     signals = log.motion.signals + np.stack([0.0 * beat, 0.0 * beat, beat])
     samples = log.motion.raw.shape[1] // len(beat)
     raw = log.motion.raw + np.stack([np.zeros(log.motion.raw.shape[1]), np.repeat(beat, samples)])
-    return PreparedLog.of(replace(log.motion, signals=signals, raw=raw), log.test_function.length)
+    motion = replace(log.motion, track=Blocks(signals, raw))
+    return PreparedLog.of(motion, log.test_function.length)
 
 
 TIME = DT * np.arange(60_000)

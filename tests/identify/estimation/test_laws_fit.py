@@ -8,6 +8,7 @@ from constructed import effect, fit_of, held, log_of, moved, waves, windowed
 
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import moving
+from identify.dataset.track import Blocks
 from identify.estimation.fit import Fit, Outcome, at_bounds, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise
@@ -45,7 +46,7 @@ def one_way(speed: float, seed: int):
     signals = motion.signals.copy()
     signals[0] = speed * np.arange(signals.shape[1]) * motion.period
     signals[1] = speed
-    return windowed(replace(motion, signals=signals, raw=signals[1:]))
+    return windowed(replace(motion, track=Blocks(signals, signals[1:])))
 
 
 def made_for(axis: AxisModel):

@@ -25,6 +25,7 @@ from constructed import (
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, scale_of, sticks
 from identify.dataset.test_function import TestFunction
+from identify.dataset.track import Blocks
 from identify.estimation.force_balance import (
     averaged_force,
     difference_step,
@@ -148,9 +149,7 @@ def test_windows_with_standstill_are_left_out_for_a_friction_that_sticks_alone()
     velocity = np.full(800, 0.3)
     velocity[200:260] = 0.9 * REST_SPEED * 0.3
     velocity[500:560] = -1.1 * REST_SPEED * 0.3
-    motion = replace(
-        SHORT, signals=np.stack([velocity, velocity, velocity]), raw=np.zeros((2, 800))
-    )
+    motion = replace(SHORT, track=Blocks(np.stack([velocity] * 3), np.zeros((2, 800))))
     window = TestFunction.of_length(0.04, motion.period)
     log = PreparedLog(motion, window, window, window.mean(velocity), window.mean(velocity))
     kept = moving([log, log], True)
@@ -163,7 +162,7 @@ def test_windows_with_standstill_are_left_out_for_a_friction_that_sticks_alone()
     for n, wanted in ((int(np.sum(part < 0.02)), True), (int(np.sum(part < 0.02)) + 1, False)):
         still = np.full(40, 0.3)
         still[:n] = 0.0
-        one = replace(motion, signals=np.stack([still, still, still]), raw=np.zeros((2, 40)))
+        one = replace(motion, track=Blocks(np.stack([still] * 3), np.zeros((2, 40))))
         found = moving([PreparedLog(one, window, window, np.zeros(1), np.zeros(1))], True)
         assert found.tolist() == [wanted]
     np.testing.assert_array_equal(kept[: len(log)], kept[len(log) :])

@@ -20,6 +20,7 @@ from built_fits import (
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.track import Blocks
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (
@@ -137,7 +138,7 @@ def test_a_stop_that_only_a_late_move_reaches_is_the_first_start():
     x = plain.position + 0.04 * np.sin(turn) * (1.0 - np.cos(turn))
     v = np.gradient(x, PERIOD)
     u = plain.command + 5.3 * np.gradient(v - plain.velocity, PERIOD)
-    motion = replace(plain, signals=np.stack([x, v, u]), raw=np.stack([v, u]))
+    motion = replace(plain, track=Blocks(np.stack([x, v, u]), np.stack([v, u])))
     low, high = (x.min() + 0.05 * np.ptp(x), x.max() - 0.05 * np.ptp(x))
     stopped = pushed(motion, fitted("end_stop", low=low, high=high, stiffness=2000.0))
     covered = replace(SEEN, position_low=float(x.min()), position_high=float(x.max()))

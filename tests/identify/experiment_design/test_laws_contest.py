@@ -11,6 +11,7 @@ from built_fits import HARDWARE, PLAIN, axis_of, built_motion, fitted
 from constructed import SHORT, moved, windowed
 
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving
+from identify.dataset.track import Blocks
 from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual
@@ -218,7 +219,7 @@ def test_a_rest_is_the_time_stood_before_the_motion():
         speed[100 : 100 + length] = 0.99 * REST_SPEED * 0.2
         speed[600:620] = -0.5 * REST_SPEED * 0.2
         speed[700:900] = 3.0 * REST_SPEED * 0.2
-        motion = replace(SHORT, signals=np.stack([speed, speed, speed]), period=3e-3)
+        motion = replace(SHORT, track=Blocks(np.stack([speed] * 3), SHORT.raw), period=3e-3)
         log = replace(LOG, motion=motion)
         stood, last, rest = 0, 0.0, []
         for v in speed:
@@ -234,7 +235,7 @@ def test_the_gap_is_where_the_difference_is_and_the_data_are_not():
     planned = windowed(moved(np.random.default_rng(2), 2.0, 1000.0))
     speed = properties(planned)["speed"]
     where = (speed > np.quantile(speed, 0.8)).astype(float)
-    slow = windowed(replace(SHORT, signals=SHORT.signals * [[1.0], [1e-3], [1.0]]))
+    slow = windowed(replace(SHORT, track=Blocks(SHORT.signals * [[1.0], [1e-3], [1.0]], SHORT.raw)))
     found = gap(planned, where, [slow])
     assert (found.feature, found.share, found.unit) == ("speed", 0.0, "m/s")
     ordered = np.sort(speed[where > 0])

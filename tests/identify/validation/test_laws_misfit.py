@@ -13,6 +13,7 @@ from noisy_motion import MASS, PUSH, RATE, noisy
 from identify.dataset.coordinates import coordinates_of, gathered, since_reversal
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
+from identify.dataset.track import Blocks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
@@ -227,7 +228,7 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
         raw = log.motion.raw + np.stack([0.0 * line, line])
         signals = log.motion.signals.copy()
         signals[2] = raw[1].reshape(signals.shape[1], -1).mean(axis=1)
-        pumped = windowed(replace(log.motion, raw=raw, signals=signals))
+        pumped = windowed(replace(log.motion, track=Blocks(signals, raw)))
         found = misfit_by_frequency(AxisModel(MASS), [pumped])
         own = (found.low <= frequency) & (frequency < found.high)
         assert found.rms[own] == pytest.approx(height / np.sqrt(2.0), rel=0.06)

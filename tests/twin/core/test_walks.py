@@ -6,6 +6,7 @@ from effect_runs import CATALOGUE
 
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force, total_forces
+from identify.dataset.track import Blocks
 from twin.core.native import Table, build_table
 from twin.core.walks import averaged_columns, reading_columns, walk, walk_sensing
 from twin.effect import Effect, Kind
@@ -23,8 +24,8 @@ def motion(n: int = N) -> Motion:
     x[150:160] = x[150]
     signals = np.stack([x, np.gradient(x, PERIOD), 3.0 * np.cos(11.0 * t)])
     others = np.stack([0.5 * x, rng.normal(0.0, 0.1, n), rng.normal(0.0, 1.0, n)])
-    return Motion("run", "x", signals, others, PERIOD, 0.5 * PERIOD, PERIOD, 0.0, signals[1:],
-                  time_origin=0.013)  # fmt: skip
+    return Motion("run", "x", Blocks(signals, signals[1:]), others, PERIOD, 0.5 * PERIOD, PERIOD,
+                  0.0, time_origin=0.013)  # fmt: skip
 
 
 def drawn(effect: Effect, seed: int) -> Fitted:
