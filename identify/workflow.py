@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,10 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import sticks
 from identify.estimation.alignment import aligned, fit_aligned
-from identify.estimation.confounded import refit
+from identify.estimation.confounded import Refit, refit
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
-from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
@@ -59,7 +58,7 @@ from twin.errors import InputError
 from twin.logs import GivenLogs, Log, logs_by_name
 from twin.memory import trim_memory
 from twin.model.file import as_model
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.written import inertial
 from twin.parallel import parallel
 from twin.progress import Progress, silent, within
@@ -102,28 +101,35 @@ def fit(
     progress(READING, 0, 1)
     model, logs, holdout, test = _given(model, logs, holdout, test, catalogue)
     found, given = datasets(model, logs, holdout, test_function, test), model
-    fits: dict[str, Fit] = {}
-    for i, (axis, dataset) in enumerate(list(found.items())):
-        progress("fitting", i, len(found))
-        fits = {a: replace(f) for a, f in fits.items()}  # less the matrices that they computed
-        dataset = telling(dataset, sticks(model.axes[axis]))
-        require_residual(model.axes[axis], dataset)
-        dataset, fitted = fit_aligned(model.axes[axis], dataset)
-        found[axis], fits[axis] = with_own_noise(fitted, dataset)
-        require_finite(fits[axis].residual, found[axis])
-    progress("intervals of the parameters", 0, 1)
-    held, tested = (
-        {a: error_if_any(role, f, found[a]) for a, f in fits.items()}
-        for role in (Role.SELECTION, Role.TEST)
-    )
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
-    intervals = {a: estimates(f) for a, f in fits.items()}
-    refits = {a: refit(given.axes[a], f, known) for a, f in fits.items()}
-    for axis, result in fits.items():
-        model = model.with_axis(axis, result.axis)
-        model = model.with_intervals(axis, intervals_to_keep(result, intervals[axis]))
+    fits: dict[str, Fit] = {}
+    intervals: dict[str, tuple[Estimate, ...]] = {}
+    refits: dict[str, Refit] = {}
+    errors: dict[Role, dict[str, float | None]] = {Role.SELECTION: {}, Role.TEST: {}}
+    for i, (axis, dataset) in enumerate([*found.items()]):
+        progress("fitting", i, len(found))
+        found[axis], fits[axis] = dataset, done = _fitted(given.axes[axis], dataset)
+        for role, own in errors.items():
+            own[axis] = error_if_any(role, done, dataset)
+        intervals[axis] = estimates(done)
+        refits[axis] = refit(given.axes[axis], done, known)
+        model = model.with_axis(axis, done.axis)
+        model = model.with_intervals(axis, intervals_to_keep(done, intervals[axis]))
+        for used in (done, dataset):
+            used.forget()  # the next axis needs the memory
     trim_memory()
+    held, tested = errors.values()
     return FitResult(model, found, fits, intervals, held, tested, given, refits)
+
+
+def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
+    """The fit of an axis, and the dataset as it was found with it. Raises InputError."""
+    dataset = telling(dataset, sticks(axis))
+    require_residual(axis, dataset)
+    dataset, fitted = fit_aligned(axis, dataset)
+    dataset, fitted = with_own_noise(fitted, dataset)
+    require_finite(fitted.residual, dataset)
+    return dataset, fitted
 
 
 @parallel()

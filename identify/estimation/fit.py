@@ -107,8 +107,8 @@ class Fit:
         return orthonormal(self.jacobian)
 
     def forget(self) -> None:
-        """Let go of these matrices, which are most of its memory; they are computed again."""
-        for name in ("jacobian", "basis"):
+        """Let go of what is most of its memory, matrices above all; it is computed again."""
+        for name in ("by_log", "jacobian", "basis", "unabsorbed"):
             self.__dict__.pop(name, None)
 
     @cached_property
