@@ -88,7 +88,8 @@ class Dataset:
 
     def forget(self) -> None:
         """Let go of what is made of the columns of its logs, where these are held."""
-        for log in (*self.logs, *self.__dict__.get("heads", ())):
+        shorter = self.__dict__.get("part", self)
+        for log in (*self.logs, *shorter.logs, *self.__dict__.get("heads", ())):
             log.motion.forget()
 
     @property
