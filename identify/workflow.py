@@ -105,12 +105,13 @@ def fit(
     fits: dict[str, Fit] = {}
     intervals: dict[str, tuple[Estimate, ...]] = {}
     refits: dict[str, Refit] = {}
-    errors: dict[Role, dict[str, float | None]] = {Role.SELECTION: {}, Role.TEST: {}}
+    held: dict[str, float | None] = {}
+    tested: dict[str, float | None] = {}
     for i, (axis, dataset) in enumerate([*found.items()]):
         progress("fitting", i, len(found))
         found[axis], fits[axis] = dataset, done = _fitted(given.axes[axis], dataset)
-        for role, own in errors.items():
-            own[axis] = error_if_any(role, done, dataset)
+        held[axis] = error_if_any(Role.SELECTION, done, dataset)
+        tested[axis] = error_if_any(Role.TEST, done, dataset)
         intervals[axis] = estimates(done)
         refits[axis] = refit(given.axes[axis], done, known)
         model = model.with_axis(axis, done.axis)
@@ -118,7 +119,6 @@ def fit(
         for used in (done, dataset):
             used.forget()  # the next axis needs the memory
     trim_memory()
-    held, tested = errors.values()
     return FitResult(model, found, fits, intervals, held, tested, given, refits)
 
 

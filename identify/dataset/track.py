@@ -40,7 +40,7 @@ class Columns:
     """Signals that are made of a log's columns when they are asked for, and can be let go of.
 
     readings (n * samples + 1,): m. force (n * samples,): N. samples: of a block. period: s, of the
-    log. The columns are those of the log in memory, whose size the signals are again and half.
+    log. The signals of all joints would be half as large again as the log, which is in memory.
     """
 
     readings: Array
