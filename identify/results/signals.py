@@ -25,10 +25,10 @@ class Signals:
     """Signals (n,) of one axis by test functions, all logs in a row.
 
     roles: of the logs; None where they have none. time: s, in its own log. coordinates, units: by
-    name, of the motion and within each period of the model. command: N. to_explain: command minus
-    mass x acceleration, N. before, after: force residual N without and with what was found (None:
-    nothing was), not a number at rest, where static friction is undetermined. effects: by name the
-    force of each effect of the final model, N, as the motor has to balance it.
+    name, of the motion, of the command and within each period of the model. to_explain: command
+    minus mass x acceleration, N. before, after: force residual N without and with what was found
+    (None: nothing was), not a number at rest, where static friction is undetermined. effects: by
+    name the force of each effect of the final model, N, as the motor has to balance it.
     """
 
     logs: tuple[PreparedLog, ...]
@@ -36,7 +36,6 @@ class Signals:
     time: Array
     coordinates: Mapping[str, Array]
     units: Mapping[str, str]
-    command: Array
     to_explain: Array
     before: Array
     after: Array | None
@@ -61,7 +60,7 @@ def signals_of(
     """The signals of some logs, with the model before anything was found, and the final one."""
     every, final = tuple(logs), after or before
     where = coordinates(final, every)
-    time, command = where.pop("time"), where.pop("command")
+    time = where.pop("time")
     del where["standstill"]
     return Signals(
         logs=every,
@@ -69,8 +68,8 @@ def signals_of(
         time=time,
         coordinates=where,
         units={name: unit_of(name, every[0].motion, KNOWN_UNITS) for name in where},
-        command=command,
-        to_explain=command - final.mass * np.concatenate([log.acceleration for log in every]),
+        to_explain=where["command"]
+        - final.mass * np.concatenate([log.acceleration for log in every]),
         before=_left(before, every),
         after=None if after is None else _left(after, every),
         effects={name: -force for name, force in effect_forces(final, every).items()},

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.dataset import Role
 from identify.output.numbers import Scale, packed, quantity, spaced, title_case, typeset
 from identify.output.report.subject import AxisView, Subject
 from identify.results.signals import Signals
 from twin.curve import Coordinate
-from twin.effect import Effect
+from twin.effect import Effect, Kind
 from twin.model.units import units_of
 from twin.signals import Array
 
@@ -41,6 +42,9 @@ def _axis(view: AxisView, named: Named, most: int) -> dict[str, Any]:
     index, every = shown_of(signals, most)
     coordinates = [n for n in signals.coordinates if n not in UNSUITED]
     _, _, left = named["before"]
+    floor, of = typeset(quantity(view.axis.floor, view.units.force)), ""
+    if view.found is not None:
+        of = f" of the {Role.TRAINING.value} logs"
     return {
         "name": view.name,
         "every": every,
@@ -61,7 +65,8 @@ def _axis(view: AxisView, named: Named, most: int) -> dict[str, Any]:
             "force": words("Force"),
             "model_before": f"model without {view.label}" if view.label else "model",
             "model_after": f"model with {view.label}",
-            "floor": typeset(quantity(view.axis.floor, view.units.force)),
+            "floor": floor,
+            "band": f"the noise floor{of}, ±{floor}",
         },
     }  # fmt: skip
 
@@ -126,7 +131,10 @@ def _of_effect(effect: Effect) -> str:
     if effect.reads("TIME"):
         return "time"
     over = next((curve.over for curve in effect.curves), None)
-    return "" if over is None else {Coordinate.SPEED: "velocity"}.get(over, over.value)
+    if over is None:  # friction that is scaled has the sign of the speed
+        scaled = effect.kind is Kind.MODIFIER and not effect.reads_other_axis
+        return "velocity" if scaled else ""
+    return {Coordinate.SPEED: "velocity"}.get(over, over.value)
 
 
 def shown_of(signals: Signals, most: int) -> tuple[NDArray[np.int64], int]:

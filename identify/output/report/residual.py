@@ -79,9 +79,9 @@ def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
     """The error by frequency beside its noise."""
     scale = Scale.of(units.force, one.rms)
     edges = np.append(one.low, one.high[-1])
-    error, noise = (
-        np.append(scale(np.where(values > 0.0, values, np.nan)), np.nan)
-        for values in (np.where(one.visited > 0.0, one.rms, np.nan), one.floor)
+    shown = (np.where(one.visited > 0.0, one.rms, np.nan), one.floor)
+    error, noise = (  # a band reaches from its lower edge to its upper: the last value stands twice
+        scale(np.where(values > 0.0, values, np.nan)[[*range(len(values)), -1]]) for values in shown
     )
     lines = [
         Drawn(units.words("force error"), error, Line.STEPS),

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,17 @@ from report_cases import Case, Outline
 
 from identify.dataset.dataset import Role
 from identify.output.numbers import arrow, quantity, typeset
-from identify.output.report.explorer import shown_of
+from identify.output.report.explorer import coordinate_of_answer, shown_of
+from identify.output.report.page import Chart
+from identify.output.report.residual import regions
 from identify.output.words.commands import Source
 from identify.output.words.diagnosis import verdict_in_words
 from identify.results.signals import Signals
 from identify.workflow import on_machine
+from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.logs import write_log
+from twin.model.machine import Fitted
 
 MOST_BYTES = 3_000_000
 
@@ -149,12 +154,33 @@ def test_the_page_holds_the_forces_of_the_final_model(case: Case, page: str) -> 
     floor = case.diagnosis.summaries["x"].floor
     before = next(one for one in axis["signals"] if one["name"] == "before")
     assert axis["floor"] == pytest.approx(floor / before["size"])
+    assert axis["texts"]["band"].startswith("the noise floor of the training logs, ±")
+
+
+def test_friction_of_one_direction_is_shown_over_speed(case: Case) -> None:
+    """It is no curve of its own, and what is left beside it may depend on anything."""
+    own = Fitted.at_start(load_catalogue()["asymmetric_friction"])
+    final = replace(case.x.final, axis=case.x.final.axis.with_effect(own))
+    finding = replace(case.x.findings[0], effect=own.effect.name)
+    found = replace(case.x, final=final, findings=(finding,))
+    (view,) = case.subject(case.concluding(found)).views
+    assert coordinate_of_answer(view, ["position", "velocity"]) == "velocity"
+
+
+def test_the_last_band_of_frequency_is_as_wide_as_it_is(case: Case) -> None:
+    (chart,) = (
+        block
+        for block in regions(case.subject(case.diagnosis).views[0])
+        if isinstance(block, Chart)
+    )
+    assert all(line.values[-1] == line.values[-2] for line in chart.lines)
 
 
 def test_a_comparison_alone_has_one_residual(case: Case, tmp_path: Path) -> None:
     (axis,) = signals_in(case.write(tmp_path / "c.html", diagnosis=None, additions=()))
     assert axis["residuals"] == ["before"]
     assert axis["texts"]["model_before"] == "model"
+    assert axis["texts"]["band"].startswith("the noise floor, ±")
     assert [log["title"] for log in axis["logs"]] == ["run 1"]
 
 
@@ -163,7 +189,7 @@ def test_of_many_samples_no_extreme_is_lost() -> None:
     before, after, force = rng.standard_normal((3, count))
     before[[17, 123_457]] = 1e3, -1e3
     after[:5000] = np.nan  # at rest
-    signals = Signals((), (), np.arange(count), {}, {}, force, force, before, after, {})
+    signals = Signals((), (), np.arange(count), {}, {}, force, before, after, {})
     index, every = shown_of(signals, 20_000)
     assert len(index) <= 20_000
     assert np.array_equal(index, np.unique(index))

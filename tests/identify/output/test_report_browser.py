@@ -57,7 +57,8 @@ def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
         new KeyboardEvent("keydown", {key: "ArrowRight", bubbles: true})); await frame();
       const later = span("left");
       document.querySelector("[data-zoom=all]").click(); await frame();
-      return {all, near, later, again: span("forces"), note, inside, end: text("coordinate-note")};
+      return {all, near, later, again: span("forces"), note, inside, end: text("coordinate-note"),
+        units: document.getElementById("motion").shown.axes.map(a => a.label)};
     """)
     low, high = zoomed["all"]
     width = high - low
@@ -67,6 +68,7 @@ def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
     assert zoomed["again"] == pytest.approx(zoomed["all"])
     assert zoomed["note"] == zoomed["end"] != zoomed["inside"]
     assert "s in view" in zoomed["inside"]
+    assert zoomed["units"] == ["Time (s), log after log", "Position (mm)"]
 
 
 def test_a_drag_zooms_and_a_log_can_be_chosen(page: Browser) -> None:
@@ -99,6 +101,7 @@ def test_any_signal_is_shown_over_any_coordinate(page: Browser) -> None:
       out.push(state());
       await choose("against", "velocity"); out.push(state());
       await choose("against", "time"); out.push(state());
+      await choose("against", "command"); out.push(state());
       await choose("show", "effect cogging"); await choose("against", "cogging_phase");
       out.push(state());
       document.getElementById("apart").click(); await frame(); out.push(state());
@@ -109,8 +112,9 @@ def test_any_signal_is_shown_over_any_coordinate(page: Browser) -> None:
     assert labels[0][1].startswith("Unexplained force (")
     assert labels[1][0].startswith("Speed (mm/s")
     assert labels[2][0] == "Time, log after log (s)"
-    assert [s[2] for s in seen] == [3, 3, 3, 2, 3]  # the coordinate, and a mean for each
-    assert seen[3][3] == pytest.approx(100.0, rel=0.05)  # mN of cogging, over one period
+    assert labels[3][0].startswith("Command (")
+    assert [s[2] for s in seen] == [3, 3, 3, 3, 2, 3]  # the coordinate, and a mean for each
+    assert seen[4][3] == pytest.approx(100.0, rel=0.05)  # mN of cogging, over one period
     # The largest residual is inside the picture.
     worst = page.run("""await choose("show", "residual"); await choose("against", "position");
       const u = document.getElementById("left").shown, y = document.getElementById("coordinate");

@@ -159,7 +159,7 @@ if (data.length) {
       series: series().map(([name, color, width], i) => line(title(name), color, to.unit, {width, show: boxes[i].checked}))},
       [x, ...series().map(([name]) => shown(name))]));
     const band = {drawClear: [u => rectangle(u, null, null, -axis.floor, axis.floor, FLOOR)]};
-    plots.push(plot($("left"), {...common, hooks: {...hooks, ...band}, height: 200, labels: ["", `${axis.texts.residual} (${left.unit})`],
+    plots.push(plot($("left"), {...common, hooks: {...hooks, ...band}, height: 230, labels: ["", `${axis.texts.residual} (${left.unit})`],
       scales: {y: {range: (u, low, high) => padded(Math.min(low ?? 0, -axis.floor), Math.max(high ?? 0, axis.floor))}},
       series: axis.residuals.map((name, i) => line(title(name), [BEFORE, AFTER][i], left.unit))},
       [x, ...axis.residuals.map(name => axis.values(name))]));
@@ -168,7 +168,7 @@ if (data.length) {
   function motion(common, hooks) {
     const against = $("against").value;  // a phase turns too often to be read over time
     const name = against === "time" || against.endsWith("_phase") ? "position" : against, s = axis.of(name);
-    plots[2] = plot($("motion"), {...common, hooks, height: 180, labels: ["Time (s), log after log", s.unit || "1"],
+    plots[2] = plot($("motion"), {...common, hooks, height: 240, labels: ["Time (s), log after log", label(s)],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
   }
@@ -255,7 +255,7 @@ if (data.length) {
       }]},
     }, [[low, ...at, high === low ? low + 1 : high], ...values]);
     $("coordinate-note").textContent = `Dots: single test functions of ${where}; lines: their means. `
-      + (floor ? `Grey: the noise floor of the training logs, ±${axis.texts.floor}.` : "")
+      + (floor ? `Grey: ${axis.texts.band}.` : "")
       + (axis.every > 1 ? ` Of every ${axis.every} test functions one and the extremes are shown.` : "");
     return u;
   }
@@ -315,7 +315,7 @@ if (data.length) {
 
 for (const place of document.querySelectorAll("[data-chart]")) {
   const spec = JSON.parse(place.dataset.chart), kinds = {
-    line: {}, dash: {dash: [7, 5]}, steps: {paths: uPlot.paths.stepped({align: 1})},
+    line: {}, dash: {dash: [7, 5]}, steps: {paths: uPlot.paths.stepped({align: 1, alignGaps: 1})},
     stems: {paths: uPlot.paths.bars({size: [0.15, 8, 2], align: 0}), fill: BEFORE},
   };
   const log = on => on ? {distr: 3} : {};
