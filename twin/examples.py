@@ -131,10 +131,12 @@ EXAMPLES: Mapping[str, Example] = {
         "map and model of a ball screw drive, a public benchmark",
         (
             "twin import DATA_EMPS.mat --map import_emps.toml -o run.mcap",
-            "twin fit emps.toml run.mcap -o fitted.toml",
+            "twin import DATA_EMPS_PULSES.mat --map import_emps.toml -o pulses.mcap",
+            "twin diagnose emps.toml run.mcap --holdout pulses.mcap --test-function 0.2",
         ),
         ("emps.toml", "import_emps.toml"),
-        data="DATA_EMPS.mat is its authors' to give: the EMPS benchmark of nonlinearbenchmark.org",
+        data="DATA_EMPS.mat and DATA_EMPS_PULSES.mat are their authors' to give: the EMPS "
+        "benchmark of nonlinearbenchmark.org",
     ),
     "laas": Example(
         "map and model of a small motor with cogging",

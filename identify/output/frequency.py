@@ -59,7 +59,7 @@ def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
     if not kept.any():
         return [("frequencies", "none tells; the band of the response reaches zero at each")]
     low, high = found.frequency[kept][[0, -1]]
-    part = f"{np.count_nonzero(kept)} of {len(kept)} tell"
+    part = f"{np.count_nonzero(kept)} of {len(kept)} usable"
     facts = [("frequencies", f"{part}, {number(low)} to {number(high)} Hz")]
     if np.isfinite(found.noise).any():
         share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))

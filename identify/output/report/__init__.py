@@ -83,12 +83,13 @@ def facts(subject: Subject) -> list[tuple[str, str]]:
 
 def origin(subject: Subject) -> list[tuple[str, str]]:
     """The footer: by what, when and of which files the page was made."""
-    diagnosis = subject.diagnosis
-    model = diagnosis.final_model if diagnosis else subject.comparison.model
+    file = subject.source.folder / subject.source.model
+    model = subject.comparison.model  # as it was given, which the file itself confirms
+    given = file.read_bytes() if file.is_file() else format_model(model).encode()
     shown = [("Date", date.today().isoformat())]
     if subject.source.command:
         shown.append(("Command", subject.source.command))
-    shown.append(("Model, sha256", hashlib.sha256(format_model(model).encode()).hexdigest()))
+    shown.append(("Model, sha256", hashlib.sha256(given).hexdigest()))
     every = [name for names in subject.logs.values() for name in names]
     return shown + [(f"{n}, sha256", _digest(subject.source.folder / n)) for n in every]
 

@@ -90,7 +90,7 @@ def correlation_in_words(correlation: Correlation) -> str:
         what = f"correlation of the force residual with {correlation.signal}"
     said = (
         f"{what}: {percent(correlation.outside)} of the lags exceed the 90 % bounds of "
-        f"±{correlation.bound:.2g} (of noise 10 %)"
+        f"±{correlation.bound:.2g} (noise alone: 10 %)"
     )
     reach = f"exceeds ±{correlation.limit:.2g}, the most that noise reaches"
     if correlation.passes:

@@ -27,6 +27,7 @@ from identify.workflow import on_machine
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.logs import write_log
+from twin.model.file import save_model
 from twin.model.machine import Fitted
 
 MOST_BYTES = 3_000_000
@@ -110,6 +111,9 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
     assert "Commandtwin diagnose drive.toml 'run 1'" in text
     assert "twin add cogging drive.toml 'run 1'" in text
     assert re.search(r"Model, sha256[0-9a-f]{64}", text)
+    save_model(case.model, tmp_path / "drive.toml")
+    text = Outline(case.write(tmp_path / "r.html", source=source)).text
+    assert f"sha256{hashlib.sha256((tmp_path / 'drive.toml').read_bytes()).hexdigest()}" in text
     assert re.search(r"Date20\d\d-\d\d-\d\d", text)
 
 
