@@ -112,7 +112,8 @@ def compare_text(result: Comparison) -> str:
                 f"axis {axis}, {name}: {words('force error')} {quantity(error, c.units.force)} "
                 f"({error / c.floor:.1f} times the noise floor){_position_error(c, name)}"
             )
-        lines += [f"  worst: {region_in_words(region)}" for region in c.worst]
+        worst = "worst of all logs" if len(c.force_error) > 1 else "worst"
+        lines += [f"  {worst}: {region_in_words(region)}" for region in c.worst]
         if not c.worst:
             lines.append("  in no region is the error above the noise")
         lines += [f"  {words(correlation_in_words(test))}" for test in c.tests.correlations]
