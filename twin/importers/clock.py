@@ -38,6 +38,7 @@ def rate_of(time: Array) -> float:
         (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > JITTER),
     ):
         if wrong.any():
+            _require_no_hole(time)  # which a clock would not mend
             row = int(np.argmax(wrong))
             raise InputError(
                 f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
@@ -51,6 +52,16 @@ def rate_of(time: Array) -> float:
 def _require_finite(time: Array) -> None:
     if (k := first_not_finite(time)) is not None:
         raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+
+
+def _require_no_hole(time: Array) -> None:
+    steps = np.diff(time)
+    gap = int(np.argmax(steps))
+    if steps[gap] > LONGEST_GAP * float(np.median(steps)) > 0.0:
+        raise InputError(
+            f"there is nothing between {instant(time[gap])} and {instant(time[gap + 1])}; import "
+            "the parts before and behind it as logs of their own"
+        )
 
 
 def even_times(begin: float, end: float, rate: float) -> Array:
@@ -104,10 +115,5 @@ def clock_of(time: Array, rate: float) -> Clock:
         raise InputError(
             f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
         )
-    gap = int(np.argmax(steps))
-    if steps[gap] > LONGEST_GAP * usual:
-        raise InputError(
-            f"there is nothing between {instant(kept[gap])} and {instant(kept[gap + 1])}; import "
-            "the parts before and behind it as logs of their own"
-        )
+    _require_no_hole(kept)
     return Clock(rows, kept, even_times(kept[0], kept[-1], rate), len(time) - len(kept))

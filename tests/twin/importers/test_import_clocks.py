@@ -51,6 +51,11 @@ def test_jittered_stamps_come_onto_one_clock_and_the_log_says_what_that_cost(tmp
             MAP,
             r"nothing between 1\.\d+ s and",
         ),
+        (  # and no clock is offered where it would be refused
+            lambda c: np.where(np.arange(len(c)) > 1500, c + 1.0, c),
+            MAP.replace("resample = 1000.0", ""),
+            r"nothing between 1\.\d+ s and",
+        ),
         (lambda c: np.zeros(len(c)), MAP, "increases in 1 of 3000 rows only"),
         (lambda c: c * np.nan, MAP, "row 1 is nan|cannot be read"),
     ],
