@@ -55,6 +55,11 @@ def simulate(
 
     stage, _ = loaded(model, effects)
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment
+    if setpoints is not None:
+        run = chosen
+        if isinstance(run, str):
+            run = find_experiment(run, stage, axis, duration or DURATION)
+        write_setpoints(run, stage, seed, setpoints)
     reach = Reach(stage)
     with progress_on_stderr() as progress:
         parts = simulate_parts(
@@ -62,15 +67,13 @@ def simulate(
             progress=partial(progress, "simulating"),
         )  # fmt: skip
         samples = record_log(map(reach.take, parts), out)
-    if setpoints is not None:
-        if isinstance(chosen, str):
-            chosen = find_experiment(chosen, stage, axis, duration or DURATION)
-        write_setpoints(chosen, stage, seed, setpoints)
     rate = stage.sample_rate
     answer = LogAnswer.of(log=out, samples=samples, sample_rate=rate, setpoints=setpoints)
     asked = None if duration is None else missed(duration, samples / rate)
     warnings = [*reach.warnings(), *([asked] if asked else [])]
-    return Said(f"{out}: {samples} samples at {rate:g} Hz", answer, warnings)
+    lines = [f"{out}: {samples} samples at {rate:g} Hz"]
+    lines += [f"{setpoints}: the setpoints, to be run on the machine"] if setpoints else []
+    return Said("\n".join(lines), answer, warnings)
 
 
 @app.command("import")

@@ -26,6 +26,7 @@ from twin.numbers import is_number
 
 SUFFIX = ".toml"
 ENDING = ".setpoints.csv"
+FORMATS = (".csv", ".yaml")
 ROWS = 100_000  # of a CSV, made at once: some 10 MB
 POINTS = 0.01  # s, between the points of a trajectory, which a controller joins by smooth curves
 
@@ -134,6 +135,8 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
     in open loop the force alone drives the axis. A .yaml file is a ROS 2 trajectory instead
     (trajectory_msgs/JointTrajectory). Raises InputError where it cannot be written.
     """
+    if path.suffix not in FORMATS:
+        raise InputError(f"{path}: setpoints are written as {' or '.join(FORMATS)} (ROS 2)")
     setpoint = setpoint_of(experiment, model, seed)
     if path.suffix == ".yaml":
         write_atomically(path, _trajectory(setpoint, [*model.axes], path).encode())

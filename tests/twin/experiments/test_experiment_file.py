@@ -155,6 +155,8 @@ def test_a_trajectory_of_ros_2_has_the_points_of_the_table(tmp_path):
             np.testing.assert_allclose(own, wanted, atol=1e-8)
     with pytest.raises(InputError, match="has no force"):
         write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / "f.yaml")
+    with pytest.raises(InputError, match=r"written as \.csv or \.yaml \(ROS 2\)"):
+        write_setpoints(experiment, PROTON, 3, tmp_path / "s.xml")
 
 
 def test_a_force_has_a_column_of_its_own(tmp_path):
