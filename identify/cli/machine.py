@@ -194,7 +194,8 @@ def info(
             raise InputError(f"-o {out}: a table is of one log; give the logs one by one")
         write_table(read_log(logs[0]), out)
     found = {str(path): log_info(path) for path in logs}
-    return Said(info_text(found), info_answer(found))
+    table = "" if out is None else f"\n{out}: its signals as a table"
+    return Said(f"{info_text(found)}{table}", info_answer(found))
 
 
 @app.command()

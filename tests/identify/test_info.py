@@ -83,6 +83,7 @@ def test_the_signals_of_a_log_go_to_other_tools_and_come_back(ending, rotary, tm
     assert [*whole.table()] == ["time [s]", "a position [rad]", "a current [A]"]
     done = cli_runs.twin("info", rotary, "-o", f"a.{ending}", folder=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert f"\na.{ending}: its signals as a table" in done.stdout
     name = "a_position" if ending == "mat" else "a position [rad]"
     (tmp_path / "map.toml").write_text(
         f'sample_rate = 1000.0\n[axes.a]\nposition = {{column = "{name}", unit = "rad"}}\n'
