@@ -160,7 +160,7 @@ EXAMPLES: Mapping[str, Example] = {
     ),
     "friction": Example(
         "a script that draws the friction models side by side",
-        ("python friction_gallery.py",),
+        ("python friction_gallery.py .",),
         ("friction_gallery.py",),
     ),
 }

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -68,6 +71,17 @@ def test_the_files_of_an_example_are_those_that_its_commands_name(name, tmp_path
             assert load_model(file).axes
         assert file.name in " ".join(example.commands) or name == "viewer"
     assert all((examples_folder() / file).is_file() for file in example.files)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["drive", "friction"])
+def test_the_scripts_of_an_example_run_as_printed(name, tmp_path) -> None:
+    example, files = write_example(name, tmp_path / "new")
+    program, *given = next(c.split() for c in example.commands if c.startswith("python "))
+    assert program == "python"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, *given], cwd=tmp_path / "new", env=environment, check=True)
+    assert len([*(tmp_path / "new").iterdir()]) > len(files)
 
 
 def test_nothing_is_written_over(tmp_path) -> None:
