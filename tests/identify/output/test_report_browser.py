@@ -67,7 +67,7 @@ def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
     assert zoomed["later"] == pytest.approx([low + width / 2, high])
     assert zoomed["again"] == pytest.approx(zoomed["all"])
     assert zoomed["note"] == zoomed["end"] != zoomed["inside"]
-    assert "s in view" in zoomed["inside"]
+    assert "s in view, of run 1 (training) to run 2 (selection)" in zoomed["inside"]
     assert zoomed["units"] == ["Time (s), log after log", "Position (mm)"]
 
 

@@ -200,7 +200,8 @@ if (data.length) {
     let a = x.findIndex(v => v >= low), b = x.length;
     while (b > a && x[b - 1] > high) b--;
     const whole = a === 0 && b === x.length;
-    return [Math.max(a, 0), b, whole ? "all logs" : `the ${digits(high - low)} s in view, of ${axis.logAt(low).title}`];
+    const logs = [...new Set([low, high].map(v => axis.logAt(v).title))].join(" to ");
+    return [Math.max(a, 0), b, whole ? "all logs" : `the ${digits(high - low)} s in view, of ${logs}`];
   }
 
   // --- any signal against any coordinate ---------------------------------------------------
