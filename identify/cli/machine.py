@@ -40,7 +40,7 @@ def simulate(
     axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
     setpoints: Annotated[
         Path | None,
-        typer.Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2)."),
+        typer.Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
     ] = None,
     effects: Effects = None,
 ) -> Said:

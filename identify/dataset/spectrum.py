@@ -100,8 +100,8 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
 def _not_negative(columns: Array, wanted: Array) -> Array:
     """Gains (k,) of least squares; a column whose gain would be the most negative is left out."""
     square, met = columns.T @ columns, columns.T @ wanted
-    size = np.sqrt(square.diagonal())
-    gains, kept = np.zeros(len(size)), np.flatnonzero(size)
+    own = square.diagonal()
+    gains, kept, size = np.zeros(len(own)), np.flatnonzero(own), np.sqrt(np.where(own, own, 1.0))
     unit, aim = square / np.outer(size, size), met / size
     while len(kept):
         found = np.linalg.lstsq(unit[kept][:, kept], aim[kept], rcond=None)[0]

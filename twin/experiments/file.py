@@ -1,7 +1,7 @@
-"""Experiments as TOML files, and their setpoints as CSV for the controller of a machine.
+"""Experiments as TOML files, and their setpoints for the controller of a machine.
 
-The TOML has one table, each parameter with its unit in a comment; the CSV time and the motion of
-each axis.
+The TOML has one table, each parameter with its unit in a comment. Setpoints are time and the motion
+of each axis as CSV, a ROS 2 trajectory as YAML, or arrays of Structured Text for a PLC.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from twin.errors import InputError, at
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
 from twin.experiments.trajectory import AnySetpoint, Setpoint
+from twin.export import axis_identifiers
 from twin.files import atomic_writer, write_atomically
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, AxisUnits
@@ -26,9 +27,10 @@ from twin.numbers import is_number
 
 SUFFIX = ".toml"
 ENDING = ".setpoints.csv"
-FORMATS = (".csv", ".yaml")
 ROWS = 100_000  # of a CSV, made at once: some 10 MB
 POINTS = 0.01  # s, between the points of a trajectory, which a controller joins by smooth curves
+CYCLE = 1e-3  # s, of the PLC task that takes a point each cycle
+A_LINE = 8  # values of an array
 
 
 def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits = LINEAR) -> str:
@@ -133,13 +135,17 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
 
     An experiment that adds a force has a column for it. In closed loop the position is followed;
     in open loop the force alone drives the axis. A .yaml file is a ROS 2 trajectory instead
-    (trajectory_msgs/JointTrajectory). Raises InputError where it cannot be written.
+    (trajectory_msgs/JointTrajectory), a .st file arrays for TwinCAT's external setpoint generation.
+    Raises InputError where it cannot be written.
     """
-    if path.suffix not in FORMATS:
-        raise InputError(f"{path}: setpoints are written as {' or '.join(FORMATS)} (ROS 2)")
+    if path.suffix not in (".csv", *TEXTS):
+        raise InputError(f"{path}: setpoints are written as .csv, .yaml (ROS 2) or .st (TwinCAT)")
     setpoint = setpoint_of(experiment, model, seed)
-    if path.suffix == ".yaml":
-        write_atomically(path, _trajectory(setpoint, [*model.axes], path).encode())
+    if path.suffix in TEXTS:
+        if isinstance(setpoint, Setpoint) and setpoint.force.any():
+            raise InputError(f"{path}: it has no place for a force, which drives this; give a .csv")
+        whole = setpoint.part(0, len(setpoint))
+        write_atomically(path, TEXTS[path.suffix](whole, model).encode())
         return
     forces = setpoint.force if isinstance(setpoint, Setpoint) else np.zeros((1, len(model.axes)))
     driven = np.flatnonzero(forces.any(axis=0))
@@ -160,19 +166,57 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
             np.savetxt(stream, np.column_stack(columns), fmt="%.9g", delimiter=",")
 
 
-def _trajectory(setpoint: AnySetpoint, joints: list[str], path: Path) -> str:
-    """The message as YAML, a point a line. Raises InputError where a force is asked for."""
-    whole = setpoint.part(0, len(setpoint))
-    position, velocity, acceleration, force = whole.columns
-    if force.any():
-        raise InputError(f"{path}: a trajectory has no force, which drives this; give a .csv")
-    step, last = max(round(POINTS * whole.sample_rate), 1), len(whole) - 1
+def _trajectory(setpoint: Setpoint, model: MachineModel) -> str:
+    """The message as YAML, a point a line."""
     lines = []
-    for k in [*range(0, last, step), last]:
-        motion = {"positions": position, "velocities": velocity, "accelerations": acceleration}
-        values = (f"{name}: [{', '.join(f'{v:.9f}' for v in x[k])}]" for name, x in motion.items())
-        seconds, rest = divmod(round(1e9 * k / whole.sample_rate), 10**9)
+    for k in _points(setpoint, POINTS):
+        named = zip(("positions", "velocities", "accelerations"), setpoint.columns, strict=False)
+        values = (f"{name}: [{', '.join(f'{v:.9f}' for v in x[k])}]" for name, x in named)
+        seconds, rest = divmod(round(1e9 * k / setpoint.sample_rate), 10**9)
         lines.append(
             f"- {{time_from_start: {{sec: {seconds}, nanosec: {rest}}}, {', '.join(values)}}}\n"
         )
-    return f"joint_names: [{', '.join(joints)}]\npoints:\n{''.join(lines)}"
+    return f"joint_names: [{', '.join(model.axes)}]\npoints:\n{''.join(lines)}"
+
+
+def _structured_text(setpoint: Setpoint, model: MachineModel) -> str:
+    """A list of global variables, and in a comment how a task feeds it (Beckhoff, Tc2_MC2)."""
+    points = _points(setpoint, CYCLE)
+    cycle, last = (points[1] - points[0]) / setpoint.sample_rate, len(points) - 1
+    names = axis_identifiers(model)
+    feeds = [
+        f"MC_ExtSetPointGenFeed({n}_Position[k], {n}_Velocity[k], {n}_Acceleration[k], "
+        f"{n}_Direction[k], {n});"
+        for n in names.values()
+    ]
+    lines = [
+        f"(* Setpoints for a PLC task of {1e3 * cycle:g} ms.",
+        "After MC_ExtSetPointGenEnable of each axis, in each cycle, with k from 0 to Last:", *feeds,
+        "The units are those in the comments; scale them to those of the axis. *)",
+        "VAR_GLOBAL CONSTANT", f"    Last : DINT := {last};", "END_VAR", "VAR_GLOBAL",
+    ]  # fmt: skip
+    for i, (axis, name) in enumerate(names.items()):
+        position, velocity, acceleration = (x[points, i] for x in setpoint.columns[:3])
+        units = model.axes[axis].units
+        for what, values, unit in (
+            ("Position", position, units.position), ("Velocity", velocity, units.velocity),
+            ("Acceleration", acceleration, units("m/s^2")),
+        ):  # fmt: skip
+            lines += _array(f"{name}_{what}", "LREAL", [f"{v:.9g}" for v in values], unit)
+        lines += _array(f"{name}_Direction", "DINT", [f"{v:.0f}" for v in np.sign(velocity)], "1")
+    return "\n".join([*lines, "END_VAR", ""])
+
+
+def _array(name: str, kind: str, values: list[str], unit: str) -> list[str]:
+    rows = [", ".join(values[k : k + A_LINE]) for k in range(0, len(values), A_LINE)]
+    head = f"    {name} : ARRAY[0..{len(values) - 1}] OF {kind} := [ (* {unit} *)"
+    return [head, *(f"        {row}," for row in rows[:-1]), f"        {rows[-1]}];"]
+
+
+def _points(setpoint: Setpoint, apart: float) -> list[int]:
+    """Samples so many s apart, and the last one."""
+    step, last = max(round(apart * setpoint.sample_rate), 1), len(setpoint) - 1
+    return [*range(0, last, step), last]
+
+
+TEXTS = {".yaml": _trajectory, ".st": _structured_text}

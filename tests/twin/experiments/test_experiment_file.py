@@ -153,10 +153,31 @@ def test_a_trajectory_of_ros_2_has_the_points_of_the_table(tmp_path):
         for axis, own in zip("xy", np.array(values, dtype=float).T, strict=True):
             wanted = np.interp(at, table["time [s]"], table[f"{axis} {name}"])
             np.testing.assert_allclose(own, wanted, atol=1e-8)
-    with pytest.raises(InputError, match="has no force"):
-        write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / "f.yaml")
-    with pytest.raises(InputError, match=r"written as \.csv or \.yaml \(ROS 2\)"):
-        write_setpoints(experiment, PROTON, 3, tmp_path / "s.xml")
+
+
+def test_structured_text_has_a_point_of_the_table_for_each_cycle(tmp_path):
+    for ending in ("csv", "st"):
+        write_setpoints(Moves(2, duration=1.003), PROTON, 3, tmp_path / f"s.{ending}")
+    table, text = read(tmp_path / "s.csv"), (tmp_path / "s.st").read_text()
+    arrays = re.findall(r"(\w+) : ARRAY\[0\.\.(\d+)\] OF \w+ := \[ \(\* (.+) \*\)([^\]]+)\];", text)
+    found = {f"{name} [{unit}]": np.array(rows.split(","), float) for name, _, unit, rows in arrays}
+    last = int(re.search(r"Last : DINT := (\d+);", text)[1])
+    assert {int(end) for _, end, _, _ in arrays} == {last} == {len(v) - 1 for v in found.values()}
+    at = np.append(np.arange(last) * 1e-3, table["time [s]"][-1])
+    for axis in "xy":
+        for name in ("position [m]", "velocity [m/s]", "acceleration [m/s^2]"):
+            wanted = np.interp(at, table["time [s]"], table[f"{axis} {name}"])
+            np.testing.assert_allclose(found[f"{axis}_{name.capitalize()}"], wanted, atol=1e-8)
+        speed = found[f"{axis}_Velocity [m/s]"]
+        assert (found[f"{axis}_Direction [1]"] == np.sign(speed)).all()
+
+
+def test_other_files_of_setpoints_are_refused(tmp_path):
+    for ending in ("yaml", "st"):
+        with pytest.raises(InputError, match="no place for a force"):
+            write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / f"f.{ending}")
+    with pytest.raises(InputError, match=r"written as \.csv, \.yaml \(ROS 2\) or \.st"):
+        write_setpoints(Moves(2, duration=1.0), PROTON, 3, tmp_path / "s.xml")
 
 
 def test_a_force_has_a_column_of_its_own(tmp_path):
