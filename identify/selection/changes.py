@@ -241,7 +241,7 @@ def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:
 
     Strengths that ended at a bound belong to another law; it is fitted without them.
     """
-    fit = _less_at_bounds(fit, judged, effect)
+    fit = _held_inside(_less_at_bounds(fit, judged, effect), effect)
     if effect.simplest is None:
         return fit
     fitted = fit.axis[effect.name]
@@ -263,6 +263,22 @@ def _less_at_bounds(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     again = fit_axis(fit.axis.with_effect(less), fit.logs)
     before, first, then = (f.error**2 for f in (judged.fit, fit, again))
     return again if before - then > RULE.promise * (before - first) else fit
+
+
+def _held_inside(fit: Fit, effect: Effect) -> Fit:
+    """The fit with what ended at a bound held half way to it, where that explains as much.
+
+    Of two values of which the logs tell a ratio alone, as the load and the stiffness of a mode
+    beyond what they reach, one ends anywhere: its bound tells nothing against the effect.
+    """
+    fitted, ended = fit.axis[effect.name], at_bounds(fit, effect.name)
+    names = [label.split(".")[-1] for label in ended]
+    if not names:
+        return fit
+    half = {n: 0.5 * (effect.parameter(n).start + fitted.values[n]) for n in names}
+    values, fixed = {**fitted.values, **half}, fitted.fixed.union(names)
+    again = fit_axis(fit.axis.with_effect(replace(fitted, values=values, fixed=fixed)), fit.logs)
+    return again if RULE.fallen * again.error < fit.error else fit
 
 
 def axis_less(effect: Effect, axis: AxisModel, base: AxisModel) -> AxisModel:
