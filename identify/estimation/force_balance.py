@@ -378,9 +378,6 @@ def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
     return size if value + size <= p.upper else -size
 
 
-STEADY_TRAVEL, STEADY_STEPS = 0.1, 2000  # m and steps over which a law settles at one place
-
-
 def force_along(
     axis: AxisModel, position: Array, velocity: Array, period: float, *kinds: Kind
 ) -> Array:
@@ -405,11 +402,13 @@ def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
     return float(-np.sign(velocity) * steady_force(replace(axis, effects=rubbing), place, velocity))
 
 
-def steady_force(axis: AxisModel, place: float, velocity: float) -> float:
+def steady_force(
+    axis: AxisModel, place: float, velocity: float, way: float = 0.1, steps: int = 2000
+) -> float:
     """Force (N) of an axis' forces and friction after a long way at one place.
 
-    place: m; velocity: m/s, not zero.
+    place: m; velocity: m/s, not zero. way: m over which a law settles, in so many steps.
     """
-    period = STEADY_TRAVEL / STEADY_STEPS / abs(velocity)
-    places, velocities = np.repeat([[place], [velocity]], STEADY_STEPS, axis=1)
+    period = way / steps / abs(velocity)
+    places, velocities = np.repeat([[place], [velocity]], steps, axis=1)
     return float(force_along(axis, places, velocities, period, Kind.FORCE, *RUBBING)[-1])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, at_bounds, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import Start, starts
@@ -31,7 +32,6 @@ from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
-SAME_ERROR = 1.01  # relative error that simpler values of an effect may have
 HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change which start is best
 MORE_EVALUATIONS = 12  # of the best of them, where it helps; frictions with a memory need them
 OTHER_EXPONENTS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
@@ -249,7 +249,7 @@ def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     if simple == dict(fitted.values):
         return fit
     again = fit_axis(fit.axis.with_effect(replace(fitted, values=simple)), fit.logs)
-    return again if again.error < SAME_ERROR * fit.error else fit
+    return again if BETTER * again.error < fit.error else fit
 
 
 def _less_at_bounds(fit: Fit, judged: Judged, effect: Effect) -> Fit:

@@ -21,8 +21,6 @@ from twin.model.machine import AxisModel, Fitted
 from twin.signals import Array
 
 SAME = 0.1  # relative distance from its value by design at which a law is still itself
-SPEEDS = 24
-SLOWEST = 0.01  # of the highest speed, the least that is drawn
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def exponent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
     force of the law is.
     """
     covered = dataset.excitation
-    speed = covered.speed_max * np.geomspace(SLOWEST, 1.0, SPEEDS)
+    speed = covered.speed_max * np.geomspace(0.01, 1.0, 24)  # that are drawn
     place = 0.5 * (covered.position_low + covered.position_high)
     kinds = {f.effect.name: f.effect.kind for f in final.axis.effects}
     rubbing = [name for name, kind in kinds.items() if kind in RUBBING]

@@ -20,6 +20,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.splines import Linearised, choose_stiffness
 from identify.estimation.variable_projection import fit_without
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate, candidate_of
 from identify.selection.controls import change_control
@@ -30,7 +31,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 Array = NDArray[np.float64]
 
 ROUNDS = 3  # of choosing the smoothing again, at most
-BETTER = 0.95  # another round must lower the error below this part
 
 
 def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
@@ -45,7 +45,7 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     for _ in range(ROUNDS):
         # The missing force had distorted the physics of the base, so choose again beside the refit.
         again = _attempt(fit_without(best.fit, dataset, effect.name), dataset, empty)
-        if not again.fit.error < BETTER * best.fit.error:
+        if not again.fit.error < RULE.fallen * best.fit.error:
             break
         best = again
     before, after = Judged(base, dataset), Judged(best.fit, dataset)

@@ -38,7 +38,6 @@ from twin.memory import trim_memory
 from twin.progress import Progress, silent, within
 
 AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
-OUTSIDE = 0.1  # of the square of a law's force, below which a free curve can make it as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +321,7 @@ def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
 def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
     """Whether a fit without a change can make its force all the same, by a free curve."""
     own = np.concatenate(change.columns(without, fit)[0](without.dataset.fit))[without.fit.kept]
-    return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < OUTSIDE * np.sum(own**2))
+    return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < RULE.least_fall * np.sum(own**2))
 
 
 def _less_replaced(
