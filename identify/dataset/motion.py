@@ -145,7 +145,7 @@ class Motion:
             self.track.forget()
             if self.bodies is not None:
                 self.bodies.forget()
-            for name in ("smoothed_position", "unrippled", "rounding"):
+            for name in ("smoothed_position", "unrippled"):
                 self.__dict__.pop(name, None)
 
     @property
@@ -268,7 +268,7 @@ class Motion:
             return self.raw[0]
         return self.raw[0] - between(ripple(self.readings, self.ripples), self.sample_period)
 
-    @cached_property
+    @property
     def rounding(self) -> Array:
         """What rounding to the readings' step made of the position, (n + 1,) m, about."""
         return rounding(self.readings, self.resolution)

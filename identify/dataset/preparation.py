@@ -53,16 +53,18 @@ def datasets(
     axis of the model moves in any training log, where a log has no samples, where a signal is not a
     number, and where a log has two roles.
     """
-    parts = zip(Role, (logs, holdout, test or {}), strict=True)
-    given = {role: dict(part) for role, part in parts}  # each log is read once
-    training = given[Role.TRAINING].values()
-    require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
-    out = _prepared(model, given, test_function)
-    trim_memory()
+    out = _prepared(model, (logs, holdout, test or {}), test_function)
+    trim_memory()  # of the logs, which are let go of by now
     return out
 
 
-def _prepared(model: MachineModel, given: Given, test_function: float | None) -> dict[str, Dataset]:
+def _prepared(
+    model: MachineModel, parts: Sequence[Mapping[str, Log]], test_function: float | None
+) -> dict[str, Dataset]:
+    """The datasets of ``datasets``; parts: the logs of each role."""
+    given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # each is read once
+    training = given[Role.TRAINING].values()
+    require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
     for logs in given.values():
         require_samples(logs)
     require_apart(given)

@@ -326,10 +326,9 @@ class FitProblem:
         self.alike = np.array([kinds.index(kind) for kind in kinds], dtype=int)
         self.pull = np.zeros(len(self.start))
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
-        # A force is linear in its strengths, so their columns are computed once.
-        self.constant = np.array([is_constant(axis, c) for c in self.scaling.where], dtype=bool)
-        self.constant_columns = jacobian(axis, logs, self._where(self.constant))
-        self._last: tuple[bytes, Array] = b"", np.zeros((0, 0))
+        linear = np.array([is_constant(axis, c) for c in self.scaling.where], dtype=bool)
+        self.bent = ~(linear & self.scaling.is_itself())
+        self._slopes, self._place = self._constant_slopes(), b""
         self._last_force: tuple[bytes, Array] = b"", np.zeros(0)
 
     def set_priors(self, internal: Array) -> float:
@@ -359,27 +358,27 @@ class FitProblem:
         self.pull[beyond] = noise / (PRIOR_SPREAD * least[beyond])
         return samples
 
-    def _where(self, mask: NDArray[np.bool_]) -> list[ParameterReference]:
-        return [c for c, wanted in zip(self.scaling.where, mask, strict=True) if wanted]
-
-    def jacobian(self, axis: AxisModel) -> Array:
-        """Derivative of the residual by the free parameters, (n, k) N per unit."""
-        columns = np.empty((len(self.kept), len(self.constant)))
-        columns[:, self.constant] = self.constant_columns
-        columns[:, ~self.constant] = jacobian(axis, self.logs, self._where(~self.constant))
-        return columns
+    def _constant_slopes(self) -> Array:
+        """Memory of the slopes, with what stays: a force is linear in its strengths."""
+        n, k = int(self.kept.sum()), len(self.start)
+        out = np.empty((n + k + len(self.smooth), k))
+        where = self.scaling.part(~self.bent).where
+        out[:n, ~self.bent] = jacobian(self.axis, self.logs, where)[self.kept]
+        out[n + k :] = self.smooth
+        return out
 
     def columns(self, internal: Array) -> Array:
         """Derivative of the kept residual by the internal variables, (n, k) N per unit.
 
-        Those of the last place are kept: the priors and the search that follows ask for the same.
+        Those of the last place are held: the priors and the search that follows ask for the same.
+        They are most of the memory of a fit, so that the next place overwrites them.
         """
-        place = internal.tobytes()
-        if self._last[0] != place:
-            axis = self.scaling.outside(self.axis, internal)
-            self._last = b"", np.zeros((0, 0))  # two places would be most of a fit's memory
-            self._last = place, self.scaling.chain(axis, self.jacobian(axis))[self.kept]
-        return self._last[1]
+        columns, place = self._slopes[: self.kept.sum()], internal.tobytes()
+        if self._place != place:
+            axis, own = self.scaling.outside(self.axis, internal), self.scaling.part(self.bent)
+            columns[:, self.bent] = own.chain(axis, jacobian(axis, self.logs, own.where))[self.kept]
+            self._place = place
+        return columns
 
     def force(self, internal: Array) -> Array:
         """The kept residual (n,) N; that of the last place is kept, as the columns are."""
@@ -394,7 +393,10 @@ class FitProblem:
         return np.concatenate([self.force(internal), pulled, self.smooth @ internal])
 
     def slopes(self, internal: Array) -> Array:
-        return np.vstack([self.columns(internal), np.diag(self.pull), self.smooth])
+        """Derivative of the rows, (n + k + m, k), until it is asked for at another place."""
+        n, k = len(self.columns(internal)), len(internal)
+        self._slopes[n : n + k] = np.diag(self.pull)
+        return self._slopes
 
     def solve(self, internal: Array, tolerance: float) -> tuple[Array, bool]:
         """Least squares from these values; the solution and whether it converged."""

@@ -26,6 +26,7 @@ MOST = 0.75  # of the fall that the columns promise: kept, the next step may tru
 MOST_EVALUATIONS = 100  # of a search that is only to end
 RIDGE = 1e-4  # of a column's length, which keeps what is not excited, or explained twice, finite
 ROUNDING = 1e-12  # of a sum of squares: what thousands of terms of rounding leave of nothing
+ROWS = 1 << 10  # that a secant changes at once
 EXACT = float(np.finfo(float).eps)  # relative fall of a sum of squares that is none
 
 
@@ -49,7 +50,8 @@ def minimise(
     """Variables that minimise the sum of squares of the residual (n,) within bounds (k,), (k,).
 
     tolerance: relative fall of the sum of squares below which the search ends. start: (k,). Where
-    the residual at the start is not finite, the start is returned as not converged.
+    the residual at the start is not finite, the start is returned as not converged. jacobian: may
+    overwrite what it gave before; nobody else does.
     """
     low, high = bounds
     x = np.clip(start, low, high)
@@ -71,7 +73,8 @@ def minimise(
             if fall < tolerance and exact:
                 return Solution(moved, True)
             if good and fall >= tolerance:
-                columns, exact = _secant(columns, moved - x, trial - force), False
+                columns, exact = columns.copy() if exact else columns, False
+                _follow(columns, moved - x, trial - force)
             else:
                 del columns  # not to be held beside the new ones
                 columns, exact = jacobian(moved), True
@@ -93,18 +96,19 @@ def _cost(force: Array) -> float:
     return float(force @ force)
 
 
-def _secant(columns: Array, step: Array, change: Array) -> Array:
-    """Columns (n, k) changed least such that they give this change (n,) along this step (k,).
+def _follow(columns: Array, step: Array, change: Array) -> None:
+    """Change columns (n, k) least such that they give this change (n,) along this step (k,).
 
     Least in columns of unit length, so that the units of the variables do not matter.
     """
     weighed = np.einsum("ij,ij->j", columns, columns) * step
     size = float(weighed @ step)
     if size == 0.0:
-        return columns
-    out = np.outer((change - columns @ step) / size, weighed)
-    out += columns
-    return out
+        return
+    gains = (change - columns @ step) / size
+    for first in range(0, len(gains), ROWS):  # the columns of a fit are most of its memory
+        at = slice(first, first + ROWS)
+        columns[at] += np.outer(gains[at], weighed)
 
 
 def _step(

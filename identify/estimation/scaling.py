@@ -131,6 +131,19 @@ class Scaling:
         low[excess], high[excess] = 0.0, (high - low)[excess]
         return low, high
 
+    def part(self, mask: NDArray[np.bool_]) -> Scaling:
+        """The same of some of the parameters."""
+        each = zip(self.where, self.limits, mask, strict=True)
+        kept = [(c, own) for c, own, wanted in each if wanted]
+        return Scaling(tuple(c for c, _ in kept), tuple(own for _, own in kept))
+
+    def is_itself(self) -> NDArray[np.bool_]:
+        """Which variables are parameters, by which no other parameter is bounded."""
+        bounding = {self._below(c) for c in self.where}
+        own = ((i, c.parameter) for i, c in enumerate(self.where))
+        alone = [p.at_least is None and i not in bounding for i, p in own]
+        return np.array(alone, dtype=bool) & ~self.is_logarithm()
+
     def is_logarithm(self) -> NDArray[np.bool_]:
         """Which variables are logarithms."""
         own = (c.parameter for c in self.where)
