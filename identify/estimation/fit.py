@@ -99,7 +99,7 @@ class Fit:
     @cached_property
     def jacobian(self) -> Array:
         """Derivative of the residual by the free parameters, (n, k) N per unit."""
-        return jacobian(self.axis, self.logs, self.scaling.where)[self.kept]
+        return jacobian(self.axis, self.logs, self.scaling.where, self.kept)
 
     @cached_property
     def basis(self) -> Array:
@@ -360,11 +360,11 @@ class FitProblem:
 
     def _constant_slopes(self) -> Array:
         """Memory of the slopes, with what stays: a force is linear in its strengths."""
-        n, k = int(self.kept.sum()), len(self.start)
+        stays = ~self.bent
+        columns = jacobian(self.axis, self.logs, self.scaling.part(stays).where, self.kept)
+        n, k = len(columns), len(stays)
         out = np.empty((n + k + len(self.smooth), k))
-        where = self.scaling.part(~self.bent).where
-        out[:n, ~self.bent] = jacobian(self.axis, self.logs, where)[self.kept]
-        out[n + k :] = self.smooth
+        out[:n, stays], out[n + k :] = columns, self.smooth
         return out
 
     def columns(self, internal: Array) -> Array:
@@ -376,7 +376,8 @@ class FitProblem:
         columns, place = self._slopes[: self.kept.sum()], internal.tobytes()
         if self._place != place:
             axis, own = self.scaling.outside(self.axis, internal), self.scaling.part(self.bent)
-            columns[:, self.bent] = own.chain(axis, jacobian(axis, self.logs, own.where))[self.kept]
+            changed = jacobian(axis, self.logs, own.where, self.kept)
+            columns[:, self.bent] = own.chain(axis, changed)
             self._place = place
         return columns
 

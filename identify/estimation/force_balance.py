@@ -9,6 +9,7 @@ from itertools import product
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
@@ -191,13 +192,19 @@ def group_of(axis: AxisModel, effect: str) -> AxisModel:
 
 
 def jacobian(
-    axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
+    axis: AxisModel,
+    logs: Sequence[PreparedLog],
+    where: Sequence[ParameterReference],
+    kept: NDArray[np.bool_] | None = None,
 ) -> Array:
-    """Derivative of the residual by these parameters, (n, n_parameters), N per unit."""
+    """Derivative of the residual by these parameters, (n, n_parameters), N per unit.
+
+    kept: which test functions are asked for, where not all are.
+    """
     values = read(axis, where)
     scale = scale_of(logs)
     steps = np.array([difference_step(c, v, scale) for c, v in zip(where, values, strict=True)])
-    changed = changes(axis, logs, where, steps)
+    changed = changes(axis, logs, where, steps, kept)
     changed /= steps[:, None]
     return changed.T
 
@@ -207,22 +214,26 @@ def changes(
     logs: Sequence[PreparedLog],
     where: Sequence[ParameterReference],
     steps: Array,
+    kept: NDArray[np.bool_] | None = None,
 ) -> Array:
     """Change (m, n) N of the residual as each of m parameters by itself changes by its step.
 
     Those of one effect go along the motion in one walk; a parameter may be given several times.
+    kept: which test functions are asked for, of which the parameters then lie side by side.
     """
-    out = np.empty((len(where), sum(map(len, logs))))
-    ends = np.cumsum([len(log) for log in logs])
-    spans = [slice(end - len(log), end) for end, log in zip(ends, logs, strict=True)]
+    asked = np.ones(sum(map(len, logs)), dtype=bool) if kept is None else kept
+    own = split_by_log(asked, logs)
+    ends = np.cumsum([np.count_nonzero(some) for some in own])
+    spans = [slice(end - np.count_nonzero(some), end) for end, some in zip(ends, own, strict=True)]
+    out = np.empty((len(where), ends[-1]), order="C" if kept is None else "F")
 
-    def walk(job: tuple[_Walk, tuple[PreparedLog, slice]]) -> None:
-        (rows, along), (log, span) = job
-        out[rows, span] = along(log)
+    def walk(job: tuple[_Walk, tuple[PreparedLog, NDArray[np.bool_], slice]]) -> None:
+        (rows, along), (log, some, span) = job
+        out[rows, span] = along(log)[:, some]
 
-    spread(walk, product(_walks(axis, where, steps), zip(logs, spans, strict=True)))
+    spread(walk, product(_walks(axis, where, steps), zip(logs, own, spans, strict=True)))
     if _borne(axis):
-        out += _by_load(axis, logs, where, steps)
+        out += _by_load(axis, logs, where, steps)[:, asked]
     return out
 
 

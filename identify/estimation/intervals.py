@@ -33,6 +33,7 @@ from twin.signals import Array
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 1.0 - 2.0 * RULE.chance  # as the truth may be off to either side
 QUANTILE = students_t(RULE.chance, BLOCKS - 1)
+AT_ONCE = 16  # estimates whose influences are held, as many are as large as the Jacobian
 GROUPS = 10  # of like influence; wide, as a law differs from the machine's over wide stretches
 FAR = 4.0  # half widths to either side at which the error must have risen
 LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
@@ -219,7 +220,8 @@ def half_widths_by(jacobian: Array, residual: Array, weights: Array) -> Array:
     known = ~(weights[~excited] != 0.0).any(axis=0)
     if not excited.any():
         return out
-    columns = jacobian[:, excited] / norms[excited]
+    columns = jacobian[:, excited]
+    columns /= norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=ROUNDING, hermitian=True)
     # The fit makes the residuals of a block smaller than its errors, so the residuals of a fit
     # without the block are used (jackknife, CR3).
@@ -231,8 +233,10 @@ def half_widths_by(jacobian: Array, residual: Array, weights: Array) -> Array:
     shift = np.abs(own.T @ inverse @ (columns.T @ residual))
     variance = np.einsum("ij,ik,kj->j", own, covariance, own)
     over_time = QUANTILE * np.sqrt(np.maximum(variance, 0.0))
-    influence = columns @ (inverse @ own)
-    over_influence = [_by_influence(column, residual) for column in influence.T]
+    weighed = inverse @ own
+    pieces = (weighed[:, k : k + AT_ONCE] for k in range(0, weighed.shape[1], AT_ONCE))
+    influences = (column for piece in pieces for column in (columns @ piece).T)
+    over_influence = np.array([_by_influence(column, residual) for column in influences])
     out[known] = np.maximum(over_time, over_influence) + shift
     return out
 

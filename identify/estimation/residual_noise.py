@@ -61,7 +61,7 @@ class Remainder:
     def of(cls, fit: Fit, logs: Sequence[PreparedLog]) -> Remainder:
         kept = moving(logs, sticks(fit.axis))
         force = residual(fit.axis, logs)[kept]
-        basis = orthonormal(jacobian(fit.axis, logs, fit.scaling.where)[kept])
+        basis = orthonormal(jacobian(fit.axis, logs, fit.scaling.where, kept))
         log = np.repeat(np.arange(len(logs)), [len(each) for each in logs])
         every = gathered(logs)
         where = {name: values[kept] for name, values in every.items()}
@@ -81,21 +81,22 @@ class Remainder:
 
         basis (n, k): of what was fitted already.
         """
-        tried = np.column_stack([values, self._controls(values)])
-        tried = unabsorbed(tried, basis)
+        tried = self._with_controls(values)
+        tried -= basis @ (basis.T @ tried)
         columns = (unabsorbed(c, basis) for c in self._predictors())
         best = np.max([self._parts(c, tried) for c in columns], axis=0)
         return bool(best[0] > RULE.least_fall and best[0] > best[1:].max())
 
-    def _controls(self, force: Array) -> Array:
-        """The force shifted within each log, (n, CONTROLS)."""
-        spans = np.split(np.arange(len(force)), np.flatnonzero(np.diff(self.logs)) + 1)
+    def _with_controls(self, values: Array) -> Array:
+        """Values (n,), and the same shifted within each log, (n, 1 + CONTROLS)."""
+        out = np.empty((len(values), 1 + CONTROLS))
+        out[:, 0] = values
+        spans = np.split(np.arange(len(values)), np.flatnonzero(np.diff(self.logs)) + 1)
         shifts = np.random.default_rng(0).uniform(*SHIFTS, (CONTROLS, len(spans)))
-        rolled = [
-            [np.roll(force[at], round(s * len(at))) for s, at in zip(row, spans, strict=True)]
-            for row in shifts
-        ]
-        return np.stack([np.concatenate(parts) for parts in rolled], axis=1)
+        for column, row in zip(out[:, 1:].T, shifts, strict=True):
+            for at, shift in zip(spans, row, strict=True):
+                column[at] = np.roll(values[at], round(shift * len(at)))
+        return out
 
     def _parts(self, columns: Array, tried: Array) -> Array:
         """Part of the square of each force (n, m) that columns (n, k) foretell, (m,).

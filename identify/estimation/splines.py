@@ -42,24 +42,29 @@ class Linearised:
 
     @classmethod
     def about(
-        cls, base: Fit, dataset: Dataset, fitted: Fitted, among: NDArray[np.bool_] | None = None
+        cls, base: Fit, dataset: Dataset, fitted: Fitted, among: NDArray[np.bool_] | None = None,
+        less: str = "",
     ) -> Linearised:
-        """The base's residual, or some of its test functions (n,), with an effect's columns."""
+        """The base's residual, or some of its test functions (n,), with an effect's columns.
+
+        less: name of an effect of the base whose columns are left out.
+        """
         some = np.flatnonzero(np.ones(len(base.residual), bool) if among is None else among)
         effect = fitted.effect
         free = [p for p in effect.strengths if p.name not in fitted.fixed]
         own = [ParameterReference(effect.name, p) for p in free]
-        where = [*base.scaling.where, *own]
+        rest = [i for i, c in enumerate(base.scaling.where) if c.effect != less or not less]
+        where = [*(base.scaling.where[i] for i in rest), *own]
         alone = replace(base.axis, effects=(fitted,))
-        first = len(base.scaling.where)
-        columns = np.empty((len(some), len(where)))
-        columns[:, :first] = base.jacobian[some]
+        first = len(rest)
+        columns = np.empty((len(some), len(where)), order="F" if less else "C")
+        columns[:, :first] = base.jacobian[np.ix_(some, rest)]
         rows, end = np.flatnonzero(base.kept)[some], 0
         for log in dataset.fit:  # one after the other: there are many columns
             begin, end = end, end + len(log)
             here = (rows >= begin) & (rows < end)
             columns[here, first:] = jacobian(alone, [log], own)[rows[here] - begin]
-        norms = np.linalg.norm(base.jacobian, axis=0)
+        norms = np.linalg.norm(base.jacobian, axis=0)[rest]
         bends = smoothing(base.axis, where, len(base.residual))
         physics = bends.T @ bends + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])
         return cls(
@@ -69,14 +74,6 @@ class Linearised:
                 for part in effect.parts if not fitted.fixed.issuperset(part.strengths)
             },
         )  # fmt: skip
-
-    def less(self, effect: str) -> Linearised:
-        """The same without the columns of one effect of the base."""
-        kept = np.array([c.effect != effect for c in self.where])
-        both = np.ix_(kept, kept)
-        parts = {name: (rows[both], mask[kept]) for name, (rows, mask) in self.parts.items()}
-        where = [c for c, k in zip(self.where, kept, strict=True) if k]
-        return Linearised(where, self.force, self.columns[:, kept], self.physics[both], parts)
 
     def spread(self, stiffness: Mapping[str, float]) -> Array:
         """Covariance (k, k) of all parameters for noise of 1 N; zero for those left out."""

@@ -225,7 +225,7 @@ def _try(ground: _Ground, shape: dict[str, float]) -> Start:
     force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
     # A reading's error changes the other forces too, but only to second order.
     alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
-    columns = jacobian(alone, ground.logs, where)[ground.kept]
+    columns = jacobian(alone, ground.logs, where, ground.kept)
     step = _bounded_step(ground.basis, force, columns, where, first)
     ends = read(axis, where) + step
     moved = {c.parameter.name: v for c, v in zip(where, ends, strict=True)}

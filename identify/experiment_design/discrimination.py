@@ -220,7 +220,7 @@ def _informative(arena: Arena, experiment: Experiment, motion: Motion) -> Simula
     noise = residual(axis, logs)[kept]
     prior = np.maximum(np.abs(read(axis, where)), [abs(c.parameter.start) for c in where])
     tau = len(noise) / effective_samples(noise)
-    columns = jacobian(axis, logs, where)[kept] * prior / (rms(noise) * np.sqrt(tau))
+    columns = jacobian(axis, logs, where, kept) * prior / (rms(noise) * np.sqrt(tau))
     information = np.eye(len(where)) + columns.T @ columns
     leverage = np.sum(columns * np.linalg.solve(information, columns.T).T, axis=1)
     gain = 0.5 * float(np.linalg.slogdet(information)[1])

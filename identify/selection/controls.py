@@ -60,7 +60,7 @@ class Trial:
         if not holdout:
             return cls(own, None, fit.floor**2, judged.other_floor**2)
         kept = np.isfinite(judged.other)
-        columns = jacobian(fit.axis, holdout, fit.scaling.where)[kept] / size
+        columns = jacobian(fit.axis, holdout, fit.scaling.where, kept) / size
         force = judged.other[kept] * fit.lessened
         return cls(own, _Part(holdout, force, columns, kept), fit.floor**2, judged.other_floor**2)
 

@@ -68,13 +68,12 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
     """
     mask = moving(dataset.fit, sticking(fit.axis, shape))[fit.kept]
     without = fit.axis.without(shape.effect)
-    linear = Linearised.about(fit, dataset, shape.empty, mask).less(shape.effect)
+    linear = Linearised.about(fit, dataset, shape.empty, mask, less=shape.effect)
     law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
     names = [c.parameter.name for c, is_own in zip(linear.where, own, strict=True) if is_own]
-    hats = linear.columns[:, own]
+    hats = linear.columns[:, len(own) - len(names) :]  # which come last
     gram, met = hats.T @ hats, hats.T @ law[fit.kept][mask]
-    del hats  # columns of all logs are large
     assumed = _read_off(gram, met)
     correction, spread = _corrected(linear, shape.stiffness)
     knots, index = _knots(shape)
