@@ -241,8 +241,11 @@ def diagnose(
             axes = beside
         else:
             body = None
+    trim_memory()
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
+    for d in axes.values():
+        d.final.forget()  # it is the last that asked for the matrices of all logs
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}

@@ -151,12 +151,15 @@ class Fit:
         noise = self.error * np.sqrt(len(self.residual) / self.samples)
         values = read(self.axis, self.scaling.where)
         out = []
-        each = zip(self.scaling.where, self.scaling.limits, values, self.jacobian.T, strict=True)
-        for c, (low, high), value, column in each:
+        each = zip(self.scaling.where, self.scaling.limits, values, strict=True)
+        for i, (c, limits, value) in enumerate(each):
+            low, high = (abs(value - edge) <= AT_EDGE * abs(edge) for edge in limits)
+            if not (low or high):  # most are, and the derivatives of all logs take long
+                continue
+            column = self.jacobian[:, i]
             pushed = -float(column @ self.residual)  # > 0: a larger value would be better
-            edge = high if pushed > 0.0 else low
             sure = abs(pushed) > SURE * noise * float(np.linalg.norm(column))
-            if sure and abs(value - edge) <= AT_EDGE * abs(edge):
+            if sure and (high if pushed > 0.0 else low):
                 out.append(c.label)
         return tuple(out)
 

@@ -346,8 +346,11 @@ def _together(
     motion = _driven(group, log, axis)[0]
     unmoved = 0.0 if absent else total_forces(table, table.parameters[None], motion)
     at_once = max(AT_ONCE // motion.signals.shape[1], 1)
-    batches = (sets[i : i + at_once] for i in range(0, len(sets), at_once))
-    means = [log.test_function.mean(total_forces(table, b, motion) - unmoved) for b in batches]
+    means = []
+    for i in range(0, len(sets), at_once):
+        forces = total_forces(table, sets[i : i + at_once], motion)
+        forces -= unmoved
+        means.append(log.test_function.mean(forces))
     return np.concatenate(means)
 
 

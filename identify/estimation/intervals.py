@@ -177,7 +177,8 @@ def inseparable(fit: Fit) -> dict[str, str]:
     """Pairs of parameters, by label, whose estimates have a correlation of almost 1."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
     excited = np.flatnonzero(norms > 0)
-    columns = fit.jacobian[:, excited] / norms[excited]
+    columns = fit.jacobian[:, excited]
+    columns /= norms[excited]
     inverse = np.linalg.pinv(columns.T @ columns, rcond=ROUNDING, hermitian=True)
     spread = np.sqrt(np.diag(inverse))
     correlation = np.abs(inverse / np.outer(spread, spread)) - np.eye(len(excited))

@@ -29,6 +29,7 @@ from identify.estimation.fit import LINES, Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
+from twin.memory import trim_memory
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
@@ -137,6 +138,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
     if len(logs) == 1 or fit.error > MOST * rms(command):
         return False
+    trim_memory()  # matrices of all logs follow
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
     least = GAUSSIAN - SURE * np.sqrt(24.0 / effective_samples(rest.force))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import split_by_log
 from identify.estimation.evidence import BETTER, blocks_of, by_blocks
 from identify.estimation.fit import Fit, part_rows, smoothing
 from identify.estimation.force_balance import jacobian
@@ -42,7 +43,11 @@ class Linearised:
 
     @classmethod
     def about(
-        cls, base: Fit, dataset: Dataset, fitted: Fitted, among: NDArray[np.bool_] | None = None,
+        cls,
+        base: Fit,
+        dataset: Dataset,
+        fitted: Fitted,
+        among: NDArray[np.bool_] | None = None,
         less: str = "",
     ) -> Linearised:
         """The base's residual, or some of its test functions (n,), with an effect's columns.
@@ -59,11 +64,11 @@ class Linearised:
         first = len(rest)
         columns = np.empty((len(some), len(where)), order="F" if less else "C")
         columns[:, :first] = base.jacobian[np.ix_(some, rest)]
-        rows, end = np.flatnonzero(base.kept)[some], 0
-        for log in dataset.fit:  # one after the other: there are many columns
-            begin, end = end, end + len(log)
-            here = (rows >= begin) & (rows < end)
-            columns[here, first:] = jacobian(alone, [log], own)[rows[here] - begin]
+        asked, end = np.zeros(len(base.kept), dtype=bool), 0
+        asked[np.flatnonzero(base.kept)[some]] = True
+        for log, kept in zip(dataset.fit, split_by_log(asked, dataset.fit), strict=True):
+            begin, end = end, end + int(kept.sum())  # one by one: there are many columns
+            columns[begin:end, first:] = jacobian(alone, [log], own, kept)
         norms = np.linalg.norm(base.jacobian, axis=0)[rest]
         bends = smoothing(base.axis, where, len(base.residual))
         physics = bends.T @ bends + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])

@@ -197,14 +197,14 @@ class _Ground:
             logs=dataset.heads if on_heads else dataset.fit,
             effect=effect,
             rest=rest,
-            basis=_basis(base, dataset if on_heads else None, rest.names),
+            basis=basis_beside(base, dataset if on_heads else None, rest.names),
             unchanged=base.residual[among[base.kept]],
             kept=base.kept[among],
         )
 
 
 @lru_cache(maxsize=4)  # every effect asks it of the same base: on the heads and whole
-def _basis(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
+def basis_beside(base: Fit, heads: Dataset | None, names: tuple[str, ...]) -> Array:
     """Orthonormal basis of what the base's parameters of some effects can add, on heads if any."""
     columns = [i for i, c in enumerate(base.scaling.where) if not c.effect or c.effect in names]
     rows = base.jacobian if heads is None else base.jacobian[heads.in_heads[base.kept]]

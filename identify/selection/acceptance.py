@@ -136,6 +136,11 @@ class Judged:
         kept = moving(logs, sticks(fit.axis))
         return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
 
+    def tell(self) -> None:
+        """Compute what a score asks for, and let go of the matrices that it takes."""
+        _ = self.training, self.other, self.parameters
+        self.fit.forget()
+
     @property
     def _smoothing(self) -> Array:
         """Penalty rows (m, k) of the free curves of the fit, N per unit."""

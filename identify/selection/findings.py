@@ -16,6 +16,7 @@ from identify.selection.found_shape import FoundShape, found_shape
 from identify.selection.free_exponent import FreeExponent, exponent_curve
 from identify.selection.search import Found, Step
 from identify.selection.trying import parameters
+from twin.memory import trim_memory
 from twin.model.machine import AxisModel
 
 
@@ -132,6 +133,8 @@ def _alike(axis: AxisModel, passed: Sequence[Step]) -> list[AxisModel]:
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
     """The finding of the steps that are about one law."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
+    less.tell()  # before the final fit asks for matrices as large
+    trim_memory()
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
     noise = steps[0].tried.candidate.is_noise  # which lowers no error

@@ -18,7 +18,7 @@ from identify.estimation.alignment import realigned, synchronised, time_origins,
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.least_squares import unabsorbed
-from identify.estimation.variable_projection import fit_multistart
+from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, prefers, score
 from identify.selection.candidates import Candidate, candidate_of, ordered
@@ -96,6 +96,7 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     progress("answer fitted to the whole logs", 0, 1)
     _forget(found)
     whole = _on_whole(found, base, dataset)
+    trim_memory()
     if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
         return whole
     return _search(whole, catalogue, progress)
@@ -107,7 +108,8 @@ def _forget(found: Found) -> None:
     fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
     for fit in (*fits, *(c.fit for c in found.ranking)):
         fit.forget()
-    Trial.beside.cache_clear()
+    for known in (Trial.beside, basis_beside):
+        known.cache_clear()
     trim_memory()
 
 
