@@ -306,7 +306,9 @@ def _by_strengths(
         own.effect, own.vector(), motion.signals, motion.period, motion.time_origin,
         test.weights, test.stride,
     )  # fmt: skip
-    return np.asarray(columns[rows] * steps[:, None])
+    columns = columns[rows]
+    columns *= steps[:, None]
+    return np.asarray(columns)
 
 
 def _difference(

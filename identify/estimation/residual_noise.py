@@ -85,7 +85,8 @@ class Remainder:
         tried = self._with_controls(values)
         tried -= basis @ (basis.T @ tried)
         columns = (unabsorbed(c, basis) for c in self._predictors())
-        best = np.max([self._parts(c, tried) for c in columns], axis=0)
+        whole = np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny)
+        best = np.max([self._parts(c, tried) / whole for c in columns], axis=0)
         return bool(best[0] > RULE.least_fall and best[0] > best[1:].max())
 
     def _with_controls(self, values: Array) -> Array:
@@ -100,7 +101,7 @@ class Remainder:
         return out
 
     def _parts(self, columns: Array, tried: Array) -> Array:
-        """Part of the square of each force (n, m) that columns (n, k) foretell, (m,).
+        """Of the squared sum of each force (n, m) what columns (n, k) foretell, (m,).
 
         Each block by what the others teach; ridge regression, by inner products of blocks.
         """
@@ -108,12 +109,11 @@ class Remainder:
         squares, products = by_blocks(columns, columns, spans), by_blocks(columns, tried, spans)
         own = squares.sum(axis=0).diagonal().mean() * np.eye(columns.shape[1])
         others = squares.sum(axis=0) - squares, products.sum(axis=0) - products
-        whole = np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny)
         parts = []
         for ridge in RIDGES:
             learned = np.linalg.solve(others[0] + ridge * own, others[1])
             told = 2.0 * products - squares @ learned
-            parts.append(np.sum(learned * told, axis=(0, 1)) / whole)
+            parts.append(np.sum(learned * told, axis=(0, 1)))
         return np.asarray(np.max(parts, axis=0))
 
     def _predictors(self) -> Iterator[Array]:

@@ -49,9 +49,11 @@ def _peaks(
 ) -> tuple[float, ...]:
     """Pitches (m) at which a sine gains more than at those beside, the largest gains first."""
     halves = np.arange(2 * FEWEST_CYCLES, 2 * MOST_CYCLES + 1)
-    turn = np.exp(1j * np.pi / span * position)[:, None]
-    # Each wave is the one before turned on by half a cycle over the travel.
-    waves = np.cumprod(np.hstack([turn ** halves[0], turn.repeat(len(halves) - 1, axis=1)]), axis=1)
+    turn = np.exp(1j * np.pi / span * position)
+    waves = np.empty((len(turn), len(halves)), dtype=complex)
+    waves[:, 0] = turn ** halves[0]
+    for k in range(1, len(halves)):  # each turned on by half a cycle over the travel
+        np.multiply(waves[:, k - 1], turn, out=waves[:, k])
     basis = orthonormal(columns)
     left = unabsorbed(force, basis)
     sine, cosine = (unabsorbed(weight[:, None] * wave, basis) for wave in (waves.imag, waves.real))

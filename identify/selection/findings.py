@@ -89,6 +89,7 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     All changes of one law are told together: another shape of an effect that was added is what the
     missing one resembles.
     """
+    found.final.tell()
     names = dict.fromkeys(s.change.name for s in found.steps)
     by_law = [[s for s in found.steps if s.change.name == name] for name in names]
     out = [_finding(steps, found) for steps in by_law]
@@ -133,7 +134,7 @@ def _alike(axis: AxisModel, passed: Sequence[Step]) -> list[AxisModel]:
 def _finding(steps: Sequence[Step], found: Found) -> Finding:
     """The finding of the steps that are about one law."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
-    less.tell()  # before the final fit asks for matrices as large
+    less.tell()  # not both fits at once, whose matrices are of whole logs
     trim_memory()
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
