@@ -7,7 +7,10 @@ would imitate; and spectral lines, which reach to pitches far below.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.spectrum import Record, find_lines
 from identify.estimation.least_squares import orthonormal, unabsorbed
@@ -18,6 +21,7 @@ MOST_CYCLES = 120  # over the travel, of the first look
 MOST_SAMPLES = 4000  # that the first look takes
 MOST_PEAKS = 6
 MOST_LINES = 3
+AT_ONCE = 32  # waves that are held; all of them take 45 MB
 EVERY = 1.0  # false-alarm probability up to which a line is tried
 
 
@@ -49,14 +53,29 @@ def _peaks(
 ) -> tuple[float, ...]:
     """Pitches (m) at which a sine gains more than at those beside, the largest gains first."""
     halves = np.arange(2 * FEWEST_CYCLES, 2 * MOST_CYCLES + 1)
-    turn = np.exp(1j * np.pi / span * position)
-    waves = np.empty((len(turn), len(halves)), dtype=complex)
-    waves[:, 0] = turn ** halves[0]
-    for k in range(1, len(halves)):  # each turned on by half a cycle over the travel
-        np.multiply(waves[:, k - 1], turn, out=waves[:, k])
     basis = orthonormal(columns)
     left = unabsorbed(force, basis)
-    sine, cosine = (unabsorbed(weight[:, None] * wave, basis) for wave in (waves.imag, waves.real))
+    waves = _waves(np.exp(1j * np.pi / span * position), halves[0], len(halves))
+    gain = np.concatenate([_gains(weight[:, None] * some, left, basis) for some in waves])
+    beside = np.pad(gain, 1)
+    tops = np.flatnonzero((gain >= beside[:-2]) & (gain >= beside[2:]))
+    best = tops[np.argsort(-gain[tops])][:MOST_PEAKS]
+    return tuple(float(2.0 * span / k) for k in halves[best])
+
+
+def _waves(turn: NDArray[np.complex128], first: int, count: int) -> Iterator[NDArray[np.complex128]]:
+    """Powers (n, k) of turns (n,) from the first on, some at a time."""
+    wave = turn**first
+    for k in range(0, count, AT_ONCE):
+        out = np.empty((min(AT_ONCE, count - k), len(turn)), dtype=complex)
+        for row in out:
+            row[:], wave = wave, wave * turn
+        yield out.T
+
+
+def _gains(waves: NDArray[np.complex128], left: Array, basis: Array) -> Array:
+    """Squared force (k,) that a sine and cosine of each wave (n, k) take of what is left (n,)."""
+    sine, cosine = unabsorbed(waves.imag, basis), unabsorbed(waves.real, basis)
     a, b, c = (
         np.einsum("ij,ij->j", *pair) for pair in ((sine, sine), (cosine, cosine), (sine, cosine))
     )
@@ -64,7 +83,4 @@ def _peaks(
     free = a * b - c**2
     sure = free > 1e-9 * a * b
     gain = np.where(sure, b * s**2 + a * t**2 - 2.0 * c * s * t, 0.0) / np.where(sure, free, 1.0)
-    beside = np.pad(gain, 1)
-    tops = np.flatnonzero((gain >= beside[:-2]) & (gain >= beside[2:]))
-    best = tops[np.argsort(-gain[tops])][:MOST_PEAKS]
-    return tuple(float(2.0 * span / k) for k in halves[best])
+    return np.asarray(gain)
