@@ -63,7 +63,9 @@ def _peaks(
     return tuple(float(2.0 * span / k) for k in halves[best])
 
 
-def _waves(turn: NDArray[np.complex128], first: int, count: int) -> Iterator[NDArray[np.complex128]]:
+def _waves(
+    turn: NDArray[np.complex128], first: int, count: int
+) -> Iterator[NDArray[np.complex128]]:
     """Powers (n, k) of turns (n,) from the first on, some at a time."""
     wave = turn**first
     for k in range(0, count, AT_ONCE):

@@ -8,7 +8,7 @@ further: two that are accepted together, and each beside the other, are needed t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,7 +94,7 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     begun = replace(fit_axis(base.axis, part.fit), begun=base.begun)
     found = _search(_begun(begun, part), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
-    _forget(found)
+    _forget(_fits_of(found))
     whole = _on_whole(found, base, dataset)
     trim_memory()
     if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
@@ -102,11 +102,16 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     return _search(whole, catalogue, progress)
 
 
-def _forget(found: Found) -> None:
-    """Let go of the matrices of a search, which nobody needs beside those of another dataset."""
+def _fits_of(found: Found) -> list[Fit]:
+    """All fits of a search, some of them several times."""
     tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.level))]
     fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
-    for fit in (*fits, *(c.fit for c in found.ranking)):
+    return [*fits, *(c.fit for c in found.ranking)]
+
+
+def _forget(fits: Iterable[Fit]) -> None:
+    """Let go of the matrices of fits that nobody needs beside those of others."""
+    for fit in fits:
         fit.forget()
     for known in (Trial.beside, basis_beside):
         known.cache_clear()
@@ -151,6 +156,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         if not new:
             break
         passed += new
+        _forget(t.judged.fit for t in last if all(t is not s.tried for s in new))
         step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         passed[-1] = steps[-1]  # which tells what it made needless
