@@ -241,7 +241,6 @@ def diagnose(
             axes = beside
         else:
             body = None
-    trim_memory()
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():

@@ -30,3 +30,12 @@ def trim_memory() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def trim_beside(size: int) -> None:
+    """The same where an array of so many bytes is held, whose like does not fit into what is free.
+
+    Behind work in threads, which leaves many times what one of them asks for at once.
+    """
+    if size >= SMALLEST_MAPPED:
+        trim_memory()

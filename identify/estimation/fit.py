@@ -23,6 +23,7 @@ from identify.estimation.spatial_periods import spatial_periods
 from identify.rules import RULE
 from twin.curve import Part
 from twin.effect import Kind
+from twin.memory import trim_beside
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
@@ -381,6 +382,7 @@ class FitProblem:
             axis, own = self.scaling.outside(self.axis, internal), self.scaling.part(self.bent)
             changed = jacobian(axis, self.logs, own.where, self.kept)
             columns[:, self.bent] = own.chain(axis, changed)
+            trim_beside(columns.nbytes)
             self._place = place
         return columns
 

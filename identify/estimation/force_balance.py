@@ -29,6 +29,7 @@ from twin.core.native import Table
 from twin.core.walks import averaged_columns, reading_columns
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
+from twin.memory import trim_beside
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
 from twin.model.units import Scale, has_size
@@ -206,6 +207,7 @@ def jacobian(
     steps = np.array([difference_step(c, v, scale) for c, v in zip(where, values, strict=True)])
     changed = changes(axis, logs, where, steps, kept)
     changed /= steps[:, None]
+    trim_beside(changed.nbytes)
     return changed.T
 
 
