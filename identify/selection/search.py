@@ -371,6 +371,7 @@ def _needed(
                 continue
             if _is_needed(step.change, without, judged):
                 # The shapes of later effects were found beside this one; they may differ without.
+                without.fit.forget()
                 again = fit_multistart(without.fit.axis, judged.dataset, judged.fit.begun)
                 without = Judged(again, judged.dataset)
                 if _is_needed(step.change, without, judged):
