@@ -1,5 +1,6 @@
 """Laws of a fit: priors hold what the data do not tell, and a value at its bound is named."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,20 @@ def test_what_the_data_cannot_separate_stays_small():
     friction = abs(found["lugre"].values["Fc"] - 0.31)
     assert abs(found["constant_force"].values["F0"]) + friction < 0.4
     assert abs(found["asymmetric_friction"].values["coulomb"]) < 1.0
+
+
+def test_a_fit_of_many_columns_holds_them_little_more_than_twice():
+    """As they are and as its search follows them; with the rest that is 2.7 times."""
+    logs = [windowed(moved(np.random.default_rng(k), 40.0, 1000.0)) for k in (1, 2)]
+    friction = effect("coulomb_viscous", {"Fc": 0.41, "sigma2": 1.7})
+    axis = AxisModel(1.7, effects=(friction, effect("empirical_map")))
+    logs = [replace(log, command=log.command - residual(axis, [log])) for log in logs]
+    fit_axis(axis, logs[:1])  # loads what is compiled
+    tracemalloc.start()
+    found = fit_axis(replace(axis, mass=1.9), logs)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3.2 * found.jacobian.nbytes
 
 
 def one_way(speed: float, seed: int):

@@ -104,6 +104,15 @@ def test_the_jacobian_is_the_difference_of_the_residual_beside_every_sensing_eff
     assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where)
 
 
+@pytest.mark.parametrize("one", ["cogging", "load_dependent_friction", "actuator_lag"])
+def test_derivatives_of_some_test_functions_are_those_of_all_there(one):
+    axis = beside(drawn(CATALOGUE[one]), STICKY, *SENSING)
+    logs, where = [*LOGS, *LOGS], free_parameters(axis)
+    kept = np.random.default_rng(1).random(sum(map(len, logs))) < 0.6
+    whole = jacobian(axis, logs, where)
+    np.testing.assert_array_equal(jacobian(axis, logs, where, kept), whole[kept])
+
+
 def test_the_residual_of_an_exactly_integrated_motion_is_zero():
     """A held force on a free mass: the weak form is an identity, not an approximation."""
     rate = 1000.0

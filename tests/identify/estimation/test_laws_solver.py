@@ -62,6 +62,30 @@ def test_curved_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
         assert found.x[1] <= high
 
 
+def test_a_search_leaves_a_jacobian_as_it_is_and_needs_the_last_one_alone():
+    t, held, given = np.linspace(0.1, 2.0, 50), np.empty((50, 2)), []
+
+    def left(x):
+        return x[0] * np.exp(-x[1] * t) - 2.0 * np.exp(-1.3 * t)
+
+    def slope(x):
+        return np.stack([np.exp(-x[1] * t), -x[0] * t * np.exp(-x[1] * t)], axis=1)
+
+    def in_one_place(x):
+        if given:
+            np.testing.assert_array_equal(held, given[-1])
+        held[:] = slope(x)
+        given.append(held.copy())
+        return held
+
+    found, wanted = (
+        minimise(left, one, np.array([1.0, 0.5]), (np.zeros(2), np.full(2, 9.0)), tolerance=1e-14)
+        for one in (in_one_place, slope)
+    )
+    assert len(given) > 1
+    np.testing.assert_array_equal(found.x, wanted.x)
+
+
 def test_a_solver_stops_where_it_was_told_and_says_so():
     def cost(x):
         return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0], x[2]])
@@ -165,6 +189,18 @@ def test_the_chain_rule_is_the_difference_by_the_internal_variables():
     size = np.abs(wanted).max()
     np.testing.assert_allclose(scaling.chain(ODD, columns), wanted, atol=1e-4 * size)
     np.testing.assert_array_equal(columns, kept)
+
+
+def test_variables_that_are_parameters_have_their_derivatives():
+    where = free_parameters(ODD)
+    scaling, labels = Scaling(where), np.array([c.label for c in where])
+    itself = scaling.is_itself()
+    assert {"cable_slab.offset", "cable_slab.k1", "cogging.a1"} <= set(labels[itself])
+    assert not itself[np.isin(labels, ["mass", "lugre.Fc", "lugre.Fs", "cogging.p"])].any()
+    columns = np.random.default_rng(6).normal(size=(5, len(where)))
+    whole, rest = scaling.chain(ODD, columns), scaling.part(~itself)
+    np.testing.assert_array_equal(whole[:, itself], columns[:, itself])
+    np.testing.assert_array_equal(whole[:, ~itself], rest.chain(ODD, columns[:, ~itself]))
 
 
 def test_what_columns_take_over_is_their_span_whatever_their_scale():
