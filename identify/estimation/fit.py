@@ -155,7 +155,7 @@ class Fit:
         each = zip(self.scaling.where, self.scaling.limits, values, strict=True)
         for i, (c, limits, value) in enumerate(each):
             low, high = (abs(value - edge) <= AT_EDGE * abs(edge) for edge in limits)
-            if not (low or high):  # most are, and the derivatives of all logs take long
+            if not (low or high):  # as most are; derivatives on whole logs take long
                 continue
             column = self.jacobian[:, i]
             pushed = -float(column @ self.residual)  # > 0: a larger value would be better

@@ -48,7 +48,7 @@ class Linearised:
         dataset: Dataset,
         fitted: Fitted,
         among: NDArray[np.bool_] | None = None,
-        less: str = "",
+        less: str | None = None,
     ) -> Linearised:
         """The base's residual, or some of its test functions (n,), with an effect's columns.
 
@@ -58,10 +58,11 @@ class Linearised:
         effect = fitted.effect
         free = [p for p in effect.strengths if p.name not in fitted.fixed]
         own = [ParameterReference(effect.name, p) for p in free]
-        rest = [i for i, c in enumerate(base.scaling.where) if c.effect != less or not less]
+        rest = np.flatnonzero([c.effect != less for c in base.scaling.where])
         where = [*(base.scaling.where[i] for i in rest), *own]
         alone = replace(base.axis, effects=(fitted,))
         first = len(rest)
+        # Who asks for less reads the columns of the effect apart from the others.
         columns = np.empty((len(some), len(where)), order="F" if less else "C")
         columns[:, :first] = base.jacobian[np.ix_(some, rest)]
         asked, end = np.zeros(len(base.kept), dtype=bool), 0
