@@ -7,13 +7,14 @@ of the logs and foretell the block that is left out. The controls are the residu
 in time within each log: as large, as slow, and owed to nothing. All are tried with the same shifts,
 so that the best of them is set against the best of its controls (P. H. Westfall, S. S. Young,
 Resampling-Based Multiple Testing, 1993). The same is asked of its size: a force whose size the
-motion foretells is one that a law of the motion makes. What curves cannot tell is asked of its
-spectrum and of its distribution: noise has no line, and no amplitude that it keeps.
+motion foretells is one that a law of the motion makes. So is what goes alike from the beginning of
+each log, beside controls that are shifted by another part of each. What curves cannot tell is asked
+of its spectrum and of its distribution: noise has no line, and no amplitude that it keeps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ class Remainder:
 
     def is_foretold(self) -> bool:
         """Whether something foretells a part of the force that matters."""
-        return self._foretold(self.force, self.basis)
+        return self._foretold(self.force, self.basis) or self._drifts()
 
     def size_is_foretold(self) -> bool:
         """The same of its size, the logarithm of its square; a few large values do not decide."""
@@ -78,27 +79,42 @@ class Remainder:
         return self._foretold(size - size.mean(), np.zeros((len(size), 0)))
 
     def _foretold(self, values: Array, basis: Array) -> bool:
-        """Whether a part of values (n,), and more than of any control, is foretold by something.
-
-        basis (n, k): of what was fitted already.
-        """
-        tried = self._with_controls(values)
-        tried -= basis @ (basis.T @ tried)
+        """Whether values (n,) are foretold by something; basis (n, k): of what was fitted."""
         columns = (unabsorbed(c, basis) for c in self._predictors())
+        at_random = np.random.default_rng(0).uniform(size=(CONTROLS, len(self._spans)))
+        return self._stand_out(values, basis, columns, at_random)
+
+    def _drifts(self) -> bool:
+        """Whether the logs go alike from their beginnings, as what warms."""
+        count = len(self._spans)
+        at_random = np.random.default_rng(0).uniform(size=(CONTROLS, 1))
+        apart = (at_random + np.arange(count) / count) % 1.0  # shifted alike, they would go alike
+        columns = unabsorbed(self._over("time"), self.basis)
+        return count > 1 and self._stand_out(self.force, self.basis, [columns], apart)
+
+    @property
+    def _spans(self) -> list[NDArray[np.int64]]:
+        """Where each log is."""
+        edges = np.flatnonzero(np.diff(self.logs)) + 1
+        return np.split(np.arange(len(self.force)), edges)
+
+    def _stand_out(
+        self, values: Array, basis: Array, columns: Iterable[Array], turns: Array
+    ) -> bool:
+        """Whether a part of values (n,), and more than of any control, is foretold by columns.
+
+        turns (m, logs): 0..1, by which the controls are shifted within each log.
+        """
+        tried = np.empty((len(values), 1 + len(turns)))
+        tried[:, 0] = values
+        shifts = SHIFTS[0] + (SHIFTS[1] - SHIFTS[0]) * turns
+        for column, row in zip(tried[:, 1:].T, shifts, strict=True):
+            for at, shift in zip(self._spans, row, strict=True):
+                column[at] = np.roll(values[at], round(shift * len(at)))
+        tried -= basis @ (basis.T @ tried)
         whole = np.maximum(np.sum(tried**2, axis=0), np.finfo(float).tiny)
         best = np.max([self._parts(c, tried) / whole for c in columns], axis=0)
         return bool(best[0] > RULE.least_fall and best[0] > best[1:].max())
-
-    def _with_controls(self, values: Array) -> Array:
-        """Values (n,), and the same shifted within each log, (n, 1 + CONTROLS)."""
-        out = np.empty((len(values), 1 + CONTROLS))
-        out[:, 0] = values
-        spans = np.split(np.arange(len(values)), np.flatnonzero(np.diff(self.logs)) + 1)
-        shifts = np.random.default_rng(0).uniform(*SHIFTS, (CONTROLS, len(spans)))
-        for column, row in zip(out[:, 1:].T, shifts, strict=True):
-            for at, shift in zip(spans, row, strict=True):
-                column[at] = np.roll(values[at], round(shift * len(at)))
-        return out
 
     def _parts(self, columns: Array, tried: Array) -> Array:
         """Of the squared sum of each force (n, m) what columns (n, k) foretell, (m,).
@@ -117,13 +133,17 @@ class Remainder:
         return np.asarray(np.max(parts, axis=0))
 
     def _predictors(self) -> Iterator[Array]:
-        """Columns (n, k) over each coordinate, alike both ways and not, and of the past."""
+        """Columns (n, k) over each coordinate, and of the past."""
         for name in self.where.keys() - {"time", "direction"}:
-            at = self.where[name]
-            knots = np.unique(np.quantile(at, np.linspace(0.0, 1.0, HATS)))
-            hats = np.stack([np.interp(at, knots, unit) for unit in np.eye(len(knots))], axis=1)
-            yield np.hstack([hats, hats * self.where["direction"][:, None]])
+            yield self._over(name)
         yield self.past
+
+    def _over(self, name: str) -> Array:
+        """Curves over a coordinate (n, k), alike both ways and not."""
+        at = self.where[name]
+        knots = np.unique(np.quantile(at, np.linspace(0.0, 1.0, HATS)))
+        hats = np.stack([np.interp(at, knots, unit) for unit in np.eye(len(knots))], axis=1)
+        return np.hstack([hats, hats * self.where["direction"][:, None]])
 
     def has_line(self) -> bool:
         """Whether it repeats, in time or along the track."""

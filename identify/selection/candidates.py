@@ -181,8 +181,8 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     """An effect that is noise: it raises the floor that readings without it would have.
 
-    It counts where it makes a good part of the error on all logs that choose, no more than it, and
-    no less than the floor may be: the rounding of slow motion is known to a third.
+    It counts where it makes a good part of the error on all logs that choose, and no more than it:
+    the steps are seen in the readings, whatever else is left.
     """
     dataset, fit = before.dataset, after.fit
     logs = (*dataset.fit, *dataset.holdout)
@@ -193,8 +193,7 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    highest = max(RULE.at_floor * floor, noise.high)
-    if not (RULE.least_part < part and SURE * floor < error < highest):
+    if not (RULE.least_part < part and SURE * floor < error):
         return plain
     t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))
     taken = Taken(t, part, part)

@@ -122,7 +122,7 @@ def diagnose_axis(
     progress("what each finding explains", 0, 1)
     found, findings = _proved(_with_ties(searched))
     final = found.final
-    # Either may be known by too low a floor; what the logs differ by is told in a remark.
+    # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
         dataset=found.dataset,
@@ -148,19 +148,19 @@ def _verdict(findings: tuple[Finding, ...], quiet: bool) -> Verdict:
 
 def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
     """What was found and is accepted beside all else at the end, the weakest left out first."""
-    found = _with_own_noise(found)
-    findings = findings_of(found)
+    ended = _with_own_noise(found)
+    findings = findings_of(ended)
     # A curve whose band holds the law everywhere tells nothing beside other findings.
     sure = [f for f in findings if f.is_sure] or findings
     no = {f.effect: f.doubt or replace(f.score, among=1).refused for f in findings}
     doubted = [f for f in findings if no[f.effect] or f not in sure]
     if not doubted:
-        return found, findings
+        return ended, findings
     weakest = min(doubted, key=lambda f: f.score.part)
-    rest = _proved(without_law(weakest.effect, found))
+    rest = _proved(without_law(weakest.effect, found))  # what is noise beside it is so no more
     if no[weakest.effect] or len(rest[1]) == len(findings) - 1:
         return rest
-    return found, findings  # others need the curve, whatever its band
+    return ended, findings  # others need the curve, whatever its band
 
 
 def _with_own_noise(found: Found) -> Found:
@@ -168,9 +168,11 @@ def _with_own_noise(found: Found) -> Found:
     noisy, final = with_own_noise(found.final.fit, found.dataset)
     if noisy is found.dataset:
         return found
-    begun = found.base.fit
+    begun, ended = found.base.fit, Judged(final, noisy)
+    if found.final.fit is begun:
+        return replace(found, dataset=noisy, base=ended, final=ended)
     base = finished(begun.axis, begun.begun, noisy.fit, begun.outcome)
-    return replace(found, dataset=noisy, base=Judged(base, noisy), final=Judged(final, noisy))
+    return replace(found, dataset=noisy, base=Judged(base, noisy), final=ended)
 
 
 def _with_ties(found: Found) -> Found:

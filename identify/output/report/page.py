@@ -132,8 +132,10 @@ class Table(Block):
     @property
     def numeric(self) -> list[bool]:
         """Which columns hold numbers alone, and so are aligned to the right; not the first."""
-        columns = [*zip(*(row.cells for row in self.rows), strict=True)][1:]
-        return [False, *(all(map(NUMBER.fullmatch, column)) for column in columns)]
+        return [
+            i > 0 and all(NUMBER.fullmatch(row.cells[i]) for row in self.rows)
+            for i in range(len(self.titles))
+        ]
 
 
 @dataclass(frozen=True)

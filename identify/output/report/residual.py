@@ -10,7 +10,12 @@ from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import Scale, capitalised, inverse, number, percent, quantity, spaced
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.residual import LOOPS, correlation_in_words, place_in_words
+from identify.output.words.residual import (
+    LEAST_SHARE,
+    LOOPS,
+    correlation_in_words,
+    place_in_words,
+)
 from identify.rules import RULE
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON
@@ -27,8 +32,9 @@ def regions(view: AxisView) -> list[Block]:
     if axis.ratio < RULE.at_floor:
         return []
     blocks: list[Block] = [regions_table(axis, of_model(view))] if axis.worst else []
-    if view.found is not None and view.found.unexplained is not None:
-        blocks.append(dependence_table(view.found.unexplained, axis.maps, view.label))
+    left = view.found and view.found.unexplained
+    if left and left.share_of_error >= LEAST_SHARE:
+        blocks.append(dependence_table(left, axis.maps, view.label))
     spectra = [m for m in axis.maps if m.coordinate == "frequency"]
     return blocks + [spectrum_chart(one, view.units) for one in spectra]
 
@@ -68,7 +74,7 @@ def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: s
     rows = [
         Row((units_of(units.get(name)).words(spaced(name)), percent(share)), bar=share)
         for name, share in sorted(dependence.shares.items(), key=lambda pair: -pair[1])
-        if share >= 0.005  # the least that is not printed as 0 %
+        if share >= LEAST_SHARE
     ]
     beside = f" with {found}" if found else ""
     caption = f"Part of what is left{beside} that a curve over each coordinate alone accounts for."

@@ -103,6 +103,13 @@ VERDICTS = {
 def verdict_in_words(found: AxisDiagnosis) -> str:
     """The answer of a diagnosis, what the logs cannot separate, and what test logs contradict."""
     said = [VERDICTS.get(found.verdict) or _proved(found)]
+    if found.verdict is Verdict.NOTHING_MISSING and not found.final.at_floor:
+        said = [
+            "The selection logs show nothing that is missing: there the force error is at its "
+            f"noise floor. That of the training logs is {found.final.ratio:.1f} times theirs: "
+            "noise of another size, or something that only they excite. Record a selection log "
+            "like them."
+        ]
     if reshaped := _reshaped(found):
         said.append(f"The law of {listed(reshaped)} has another shape too.")
     said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []

@@ -10,6 +10,8 @@ from identify.validation.misfit_maps import Region
 from identify.validation.whiteness import Correlation, Loop
 from twin.model.units import units_of
 
+LEAST_SHARE = 0.005  # of a squared error that is not printed as 0 %
+
 
 def region_in_words(region: Region) -> str:
     """E.g. "moving backwards: 121 mN RMS, 14.3 times the noise floor, 37 % of the ...".
@@ -42,6 +44,8 @@ def place_in_words(region: Region) -> str:
 
 def dependence_in_words(dependence: Dependence) -> str:
     """On which coordinate an unexplained error depends, and its period where it has one."""
+    if dependence.share_of_error < LEAST_SHARE:
+        return "The error depends on nothing that was measured."
     period = ""
     if dependence.period is not None:
         period = f", with a period of {quantity(dependence.period, dependence.unit)}"

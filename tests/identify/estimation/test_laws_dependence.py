@@ -165,6 +165,11 @@ def bursts(log, rng):
     return 6.0 * SIZE * rng.standard_normal(len(log)) * (np.arange(len(log)) % 97 < 4)
 
 
+def drift(log, rng):
+    """A force that falls in each log alike, such as with its warming."""
+    return noise(log, rng) + 3.0 * SIZE * (1.0 - 2.0 * log.time / log.time[-1])
+
+
 def fit_to(data):
     return finished(PLAIN, PLAIN, data.fit, Outcome.CONVERGED)
 
@@ -172,7 +177,14 @@ def fit_to(data):
 @pytest.mark.parametrize("held", [("held",), ()], ids=["held out", "left out"])
 @pytest.mark.parametrize(
     ("force", "is_noise"),
-    [(noise, True), (of_place, False), (of_speed, False), (chirp, False), (bursts, False)],
+    [
+        (noise, True),
+        (of_place, False),
+        (of_speed, False),
+        (chirp, False),
+        (bursts, False),
+        (drift, False),
+    ],
 )
 def test_only_what_nothing_foretells_is_noise(force, is_noise, held):
     data = left(force, held)

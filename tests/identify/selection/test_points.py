@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from planted_logs import HARDWARE, NOISE, RATE, RUBS, SLIDE, Ride, asked, begun, few, having, logged
 from scipy.signal import lfilter
 
+import identify
+from identify.output.as_json import json_of
 from identify.output.words.commands import next_commands
 from identify.output.words.diagnosis import verdict_in_words
 from identify.output.words.findings import finding_in_words
@@ -22,7 +24,7 @@ from identify.selection.findings import FindingKind
 from identify.selection.found_shape import found_shape
 from identify.selection.trying import try_effect
 from twin.logs import Log
-from twin.model.machine import AxisModel, Fitted
+from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
 
@@ -117,6 +119,43 @@ def test_a_bound_that_the_logs_do_not_prefer_is_held_against_no_effect() -> None
     assert found.final.at_floor
     held = found.final.axis["flexible_mode"]
     assert [p for p in held.fixed if held.values[p] < held.effect.parameter(p).upper]
+
+
+# Of own simulators.
+
+
+def hum(seed: int) -> Array:
+    """Force noise of 50 mN with a memory of 20 ms, N."""
+    rng = np.random.default_rng(seed)
+    return lfilter([1.0], [1.0, -np.exp(-0.05)], 0.05 * 0.31 * rng.standard_normal(6000))
+
+
+def with_hum(log: Log, seed: int, times: float = 1.0) -> Log:
+    """The same log with that noise in its command."""
+    x = log.axes["x"]
+    return log_of(RATE, x.position, x.force + times * hum(seed))
+
+
+def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
+    """That the noise floor rises is no change of the model: each form had unpacked its findings."""
+    one, two, held = (with_hum(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
+    model = MachineModel("m", {"x": SLIDE}, RATE)
+    found = identify.diagnose(model, {"one": one, "two": two}, {"held": held})
+    assert found.axes["x"].verdict is Verdict.NOTHING_MISSING
+    assert found.axes["x"].dataset.force_noise > 0.02
+    assert "force noise that no sensor explains" in str(found)
+    assert json_of(found)["axes"]["x"]["verdict"] == "nothing_missing"
+
+
+def test_rounding_is_named_beside_noise_that_no_sensor_makes() -> None:
+    def read(log: Log, seed: int) -> Log:
+        x = with_hum(log, seed, 2.0).axes["x"]
+        return log_of(RATE, np.round(x.position / 4e-6) * 4e-6, x.force)
+
+    one, two, held = (read(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
+    catalogue = few("encoder_quantization", "cogging", "quadratic_drag", "spring")
+    found = diagnose_axis(*begun(SLIDE, {"one": one, "two": two}, {"held": held}), catalogue)
+    assert found.named == ("encoder_quantization",)
 
 
 @pytest.mark.parametrize("size", [-0.4, 0.4])
