@@ -149,7 +149,7 @@ def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
 
 def test_rounding_is_named_beside_noise_that_no_sensor_makes() -> None:
     def read(log: Log, seed: int) -> Log:
-        x = with_hum(log, seed, 1.5).axes["x"]
+        x = with_hum(log, seed, 1.4).axes["x"]
         return log_of(RATE, np.round(x.position / 4e-6) * 4e-6, x.force)
 
     one, two, held = (read(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
