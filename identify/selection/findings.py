@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from identify.dataset.dataset import Dataset, Role
+from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
@@ -67,8 +68,8 @@ class Finding:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the test error, on which nothing was decided, does not fall with it."""
-        return self.tested.on is Role.TEST and self.tested.after >= self.tested.before
+        """Whether the test error, on which nothing was decided, hardly falls with it."""
+        return self.tested.on is Role.TEST and self.tested.after > BETTER * self.tested.before
 
     @property
     def is_sure(self) -> bool:

@@ -138,7 +138,14 @@ def _ties(found: AxisDiagnosis) -> str:
     for name, alike in ties.items():
         if {*alike} - {other for other in said if name in ties[other]}:
             said.append(name)
-    return ", or ".join(f"{name} from {' or '.join(ties[name])}" for name in said)
+    return ", or ".join(f"{name} from {' or '.join(tied_in_words(name, found))}" for name in said)
+
+
+def tied_in_words(name: str, found: AxisDiagnosis) -> list[str]:
+    """What the logs cannot tell from a finding; a law of the model is so by another shape."""
+    tied = next(f.tied for f in found.findings if f.effect == name)
+    given = found.base.axis.names
+    return [f"another shape of {other}" if other in given else other for other in tied]
 
 
 def headline_in_words(found: AxisDiagnosis) -> str:
@@ -169,8 +176,10 @@ def named_in_words(found: AxisDiagnosis) -> str:
     """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is."""
     alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
     each = [
-        " or ".join((f"something like {name}" if name in alike else name, *tied))
-        for name, *tied in found.answers
+        " or ".join(
+            (f"something like {name}" if name in alike else name, *tied_in_words(name, found))
+        )
+        for name in found.named
     ]
     ambiguous = any(tied for _, *tied in found.answers)
     return ", and ".join(each) if ambiguous or not each else listed(each)
