@@ -282,12 +282,14 @@ def motion_of(
     longest_block: float = LONGEST_BLOCK,
     ripples: tuple[float, ...] | None = None,
     bodies: Bodies | None = None,
+    encoder_noise: float = np.inf,
 ) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
     longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies:
-    of a joint.
+    of a joint. encoder_noise: m rms, where other logs tell it; more than it asks for no longer
+    blocks, in which a reversal is smeared.
     Raises InputError where the axis is not in the log, does not move, or is too short.
     """
     if axis not in log.axes:
@@ -304,7 +306,7 @@ def motion_of(
     position, weight = together(readings, log.axes[axis].columns.get("velocity"), log.period)
     ripples = ripple_periods(position) if ripples is None else ripples
     noise = white_noise(position - ripple(position, ripples))
-    block = _block_samples(position, noise, log.period, longest_block)
+    block = _block_samples(position, min(noise, encoder_noise), log.period, longest_block)
     whole = (len(position) - 1) // block * block
     if bodies is not None:
         position = bodies.readings[bodies.index]  # the same, which is in memory already

@@ -26,7 +26,7 @@ from identify.dataset.given_logs import (
 )
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog, moving
-from identify.dataset.readings import ripples_of_widest
+from identify.dataset.readings import noise_of_most, ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
 from twin.logs import Log
@@ -99,10 +99,12 @@ def _of_axis(
     """
     axis, machine = model.axes[name], tuple(model.axes)
     ripples = ripples_of_widest(going[Role.TRAINING].values(), name)
+    deciders = [*going[Role.TRAINING].values(), *going[Role.SELECTION].values()]
+    noise = noise_of_most(deciders, name)
 
     def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
         logs = [going[r] for r in roles]
-        made = cache(partial(_motions, logs, name, machine, ripples, bodies))
+        made = cache(partial(_motions, logs, name, machine, ripples, noise, bodies))
         return partial(_long_enough, made)
 
     deciding = motions_at(Role.TRAINING, Role.SELECTION)
@@ -172,14 +174,15 @@ def _motions(
     axis: str,
     machine: tuple[str, ...],
     ripples: tuple[float, ...],
+    noise: float,
     bodies: Mapping[str, Bodies],
     longest: float,
 ) -> tuple[list[Motion], ...]:
-    """Motions of each part of the logs, in blocks of at most a length (s); ripples: m."""
+    """Motions of each part of the logs, in blocks of at most a length (s); ripples, noise: m."""
 
     def motion(given: tuple[str, Log]) -> Motion:
         name, log = given
-        return motion_of(log, axis, name, machine, longest, ripples, bodies.get(name))
+        return motion_of(log, axis, name, machine, longest, ripples, bodies.get(name), noise)
 
     made = iter(spread(motion, [given for some in parts for given in some.items()]))
     return tuple([*islice(made, len(some))] for some in parts)

@@ -11,7 +11,7 @@ rounding of readings to a step, of step/pi at most.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from statistics import NormalDist
+from statistics import NormalDist, median_high
 
 import numpy as np
 
@@ -124,6 +124,16 @@ def ripples_of_widest(logs: Iterable[Log], axis: str) -> tuple[float, ...]:
     having = [log.axes[axis] for log in logs if axis in log.axes]
     widest = max(having, key=lambda signals: float(np.ptp(signals.position)), default=None)
     return () if widest is None else ripple_periods(widest.position)
+
+
+def noise_of_most(logs: Iterable[Log], axis: str) -> float:
+    """White noise (m rms) that the readings of an axis exceed in less than half of the logs.
+
+    All logs are of one encoder; where in one of them readings are held or lost, it seems to have
+    more. inf where no log has the axis.
+    """
+    having = [log.axes[axis].position[:ENOUGH] for log in logs if axis in log.axes]
+    return median_high(map(white_noise, having)) if having else np.inf
 
 
 def ripple_periods(readings: Array) -> tuple[float, ...]:

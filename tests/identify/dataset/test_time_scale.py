@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from constructed import CATALOGUE, log_of
+from check_drive import BIAS, COULOMB, DAMPING, drive
+from check_drive import MASS as DRIVEN
+from constructed import CATALOGUE, effect, log_of
 
 from identify.analysis.first_model import first_model
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import FOREIGN, HELD, Scale, beginnings
+from identify.estimation.evidence import rms
+from identify.estimation.fit import error_on
 from identify.output.words.fit import prepared_in_words
 from identify.workflow import compare, fit
 from twin.errors import InputError
@@ -42,6 +46,25 @@ def test_what_a_quiet_length_averages_away_asks_for_a_shorter_one():
     short, long = (Scale.of(length, [motion]) for length in (fast, still))
     assert short.shows_more_than(long)
     assert not long.shows_more_than(short)
+
+
+def test_a_log_in_which_readings_are_held_has_the_blocks_of_the_others():
+    """They look like noise; blocks as long as that asks for would smear every reversal."""
+
+    def held(columns):
+        at = np.arange(len(columns["position"]))
+        columns["position"] = columns["position"][at - (at % 3 == 2)]
+
+    whole, lossy = drive(5000.0), drive(5000.0, change=held)
+    logs = {str(k): whole.part(4000 * k, 4000 * (k + 1)) for k in range(3)}
+    friction = effect("coulomb_viscous", {"Fc": COULOMB, "Fs": COULOMB, "sigma2": DAMPING})
+    axis = AxisModel(DRIVEN, effects=(friction, effect("constant_force", {"F0": -BIAS})))
+    model = MachineModel("drive", {"x": axis}, 5000.0)
+    found = datasets(model, logs, {"lossy": lossy.part(12_000, 16_000)}, 0.1)["x"]
+    (other,) = found.holdout
+    assert other.motion.position_noise > 10.0 * found.fit[0].motion.position_noise
+    assert other.motion.period == found.fit[0].motion.period
+    assert rms(error_on(axis, found.holdout)) < 0.02 * COULOMB
 
 
 def test_a_beginning_in_which_a_force_moves_nothing_is_left_out():
