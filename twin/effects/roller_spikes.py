@@ -55,6 +55,8 @@ EFFECT = Effect(
     ),
     states=("direction",),
     law=law,
+    # Bumps wider than their distance leave nothing between them: a constant or a friction.
+    is_itself=lambda values, e: values["width"] <= values["pitch"],
     curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
     fingerprint="narrow peaks of the residual at equal distances along the track",
     excited_by="constant-speed passes over several pitches in both directions",

@@ -83,6 +83,13 @@ def test_an_end_stop_ends_a_travel_and_pushes(low, high, push, itself):
     assert CATALOGUE["end_stop"].is_itself(values, COVERED) is itself
 
 
+@pytest.mark.parametrize(("width", "itself"), [(0.004, True), (0.5, False)])
+def test_bumps_have_a_distance(width, itself):
+    """Wider ones make a constant force, which had been named so."""
+    values = {"pitch": 0.034, "width": width, "phase": 0.0, "ahead": 1.0, "behind": 1.0}
+    assert CATALOGUE["roller_spikes"].is_itself(values, COVERED) is itself
+
+
 def law(p, s, io):
     io[0] = io[V]
 
