@@ -188,8 +188,11 @@ def fit_axis(
     problem, internal = _begun(axis, logs, most_evaluations)
     converged = True
     # Priors weighed by a much larger error than what is left hold the fit back; hence once more.
+    # Near the end they are weighed by what no values take: what they hold back would sustain them.
     while len(internal) and converged:
-        before, samples = rms(problem.force(internal)), problem.set_priors(internal)
+        left = problem.force(internal)
+        before, basis = rms(left), orthonormal(problem.columns(internal))
+        samples = problem.set_priors(internal, unabsorbed(left, basis))
         internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
         if not rms(problem.force(internal)) < RULE.fallen * before:
             break
@@ -208,7 +211,7 @@ def _begun(
     problem = FitProblem(axis, logs, most_evaluations)
     internal = problem.start
     if len(internal):
-        problem.set_priors(internal)
+        problem.set_priors(internal, problem.force(internal))
         internal, _ = problem.solve(internal, ROUGHLY)
     return problem, internal
 
@@ -335,13 +338,13 @@ class FitProblem:
         self._slopes, self._place = self._constant_slopes(), b""
         self._last_force: tuple[bytes, Array] = b"", np.zeros(0)
 
-    def set_priors(self, internal: Array) -> float:
-        """Weigh the priors by the residual's size, its colour, and the force to be explained.
+    def set_priors(self, internal: Array, left: Array) -> float:
+        """Weigh the priors by the size of an error, its colour, and the force to be explained.
 
-        Returns the effective sample size of the residual there.
+        left: of the residual (n,) N at these variables, all or a part. Returns its effective sample
+        size.
         """
         axis = self.scaling.outside(self.axis, internal)
-        left = self.force(internal)
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
         explained = rms((command - inertia)[self.kept])
