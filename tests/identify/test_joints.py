@@ -10,7 +10,7 @@ import arms
 import mujoco
 import numpy as np
 import pytest
-from arms import ARM, COULOMB, JOINTS, STEEP, VISCOUS, arm_log, arm_of, friction
+from arms import ARM, COULOMB, JOINTS, SAMPLE, STEEP, VISCOUS, arm_log, arm_of, friction
 from cli_runs import refusal, twin
 from strict_json import valid
 
@@ -28,13 +28,14 @@ from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import setpoint_of
 from twin.experiments.kinds import Passes, Tracking, kind_of
 from twin.experiments.named import simulate
-from twin.logs import read_log, write_log
+from twin.logs import Log, read_log, write_log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
 from twin.simulator import MujocoSimulator
 
 RIVALS = ("gravity", "spring")
+LOCAL = "position_dependent_friction"
 FEW = Catalogue([load_catalogue()[n] for n in ("coulomb_viscous", "rotor_inertia", "gravity")])
 NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
@@ -252,6 +253,38 @@ def test_a_simulated_arm_holds_its_weight_from_the_first_sample(folder, kind):
         assert np.abs(off).max() < 5e-4  # rad; under feedback alone it falls by 2 to 4 mrad
         most = np.abs(recorded.axes[joint].force).max()  # weight included
         assert model.axes[joint].hardware.force_limit == pytest.approx(2.0 * most, rel=0.01)
+
+
+def loaded_slowly(seed: int) -> Log:
+    """Of inverse dynamics along slow sines; the shoulder's friction follows its load."""
+    model, rng = mujoco.MjModel.from_xml_string(ARM), np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    rate, size = 0.1 * np.pi * rng.uniform(0.1, 0.7, (3, 3)), rng.uniform(0.2, 0.5, (3, 3))
+    size[:, 2] *= 0.01  # the elbow hardly moves, so that the load is a function of the place
+    at = rate * (0.5 * SAMPLE * np.arange(24_000))[:, None, None] + rng.uniform(0.0, 6.0, (3, 3))
+    turned = (np.sin(at), rate * np.cos(at), -(rate**2) * np.sin(at))
+    position, *moved = ((size * part).sum(axis=1) for part in turned)
+    torque = np.empty((len(position) // 2, 3))
+    for k, own in enumerate(zip(position[1::2], *(m[1::2] for m in moved), strict=True)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = own
+        mujoco.mj_inverse(model, data)
+        torque[k] = data.qfrc_inverse
+    velocity = moved[0][1::2]
+    growth = 1.0 + 0.1 * np.abs(torque) * [0.0, 1.0, 0.0]
+    force = torque + growth * COULOMB * np.sign(velocity) + VISCOUS * velocity
+    return arm_of(position[::2] + 1e-6 * rng.standard_normal(torque.shape), force)
+
+
+def test_friction_that_follows_the_load_is_fitted_where_the_load_hardly_changes(folder):
+    """Its prior had held it at 27 times the noise floor, where a profile along the travel won."""
+    logs = {str(seed): loaded_slowly(seed) for seed in (1, 2)}
+    few = Catalogue([load_catalogue()[n] for n in ("joint_load_friction", LOCAL)])
+    found = fit(folder / "arm.toml", {"1": logs["1"]}, {"2": logs["2"]})
+    shoulder = diagnose_axis(found.fits["shoulder"], found.datasets["shoulder"], few)
+    assert shoulder.named == ("joint_load_friction",)
+    axis = shoulder.final.axis
+    assert axis["joint_load_friction"].values["growth"] == pytest.approx(0.1, rel=0.01)
+    assert axis["coulomb_viscous"].values["Fc"] == pytest.approx(COULOMB[1], rel=0.01)
 
 
 def test_a_constant_force_is_no_torque_constant(folder):
