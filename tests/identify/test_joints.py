@@ -139,6 +139,10 @@ HIDDEN = {
     "transmission_coupling": (
         "elbow", lambda q, v: [0.0, 0.0, -0.15 * np.tanh((v[1] + v[2]) / STEEP)],
     ),
+    "spring": ("base", lambda q, v: [-1.5 * q[0], 0.0, 0.0]),
+    "quadratic_drag": ("base", lambda q, v: [-0.3 * v[0] * abs(v[0]), 0.0, 0.0]),
+    "asymmetric_friction": ("elbow", lambda q, v: [0.0, 0.0, -0.04 * abs(np.tanh(v[2] / STEEP))]),
+    LOCAL: ("base", lambda q, v: [-0.3 * np.sin(2.0 * q[0]) * np.tanh(v[0] / STEEP), 0.0, 0.0]),
 }  # fmt: skip
 
 
