@@ -27,7 +27,7 @@ SIGNALS = ("position", "force", "current")  # a velocity has a unit and a sign o
 HEAD = 240.0  # s of all joints together, of the log's beginning that tells it
 LEAST_LEFT = 0.01  # of a joint's squared torque: where none leaves as much, all is right
 MOST_TRIED = 8  # joints, those that leave most: each asks for the torques of all joints anew
-LEAST_FALL = 0.5  # of the squared torque that is left, from which another assignment is believed
+LEAST_FALL = 0.5  # product over the joints, below which another assignment is believed
 
 
 def misassigned(model: MachineModel, log: Log) -> str | None:
@@ -42,14 +42,17 @@ def misassigned(model: MachineModel, log: Log) -> str | None:
         return None
     worst = sorted(zip(parts, going, strict=True), reverse=True)[:MOST_TRIED]
     suspects = [axis for axis in going if axis in {a for _, a in worst}]
-    tried = ((float(_left(model, o, going).sum()), s) for o, s in _others(model, head, suspects))
-    best, given = min(tried), float(parts.sum())
-    if best[0] >= LEAST_FALL * given:
+    tried = ((_left(model, o, going), said) for o, said in _others(model, head, suspects))
+    left, said = min(tried, key=lambda pair: float(pair[0].sum()))
+    # Joint by joint, as one whose coupling or friction the model lacks may leave most of all.
+    falls = np.maximum(left, LEAST_LEFT) / np.maximum(parts, LEAST_LEFT)
+    if falls.prod() >= LEAST_FALL:
         return None
-    left = 100.0 * (best[0] / given) ** 0.5
+    most = int(np.argmin(falls))
+    before, after = (100.0 * float(each[most]) ** 0.5 for each in (parts, left))
     return (
-        f"{best[1]} they would leave {left:.0f} % of the torque that the bodies and friction leave "
-        "now; correct the import map, or the file"
+        f"{said} bodies and friction would leave {after:.0f} % of the torque of {going[most]}, in "
+        f"place of {before:.0f} %; correct the import map, or the file"
     )
 
 

@@ -74,6 +74,13 @@ def test_planted_friction_is_found(folder):
         (lambda p, f: (p[:, [0, 2, 1]], f[:, [0, 2, 1]]), "axes shoulder and elbow: exchanged"),
         (lambda p, f: (p * [1, np.degrees(1), 1], f), "axis shoulder: with positions in deg"),
         (lambda p, f: (np.radians(p), f), "axes base, shoulder, elbow: with positions in rad"),
+        (
+            lambda p, f: (
+                p[:, [1, 0, 2]],
+                f[:, [1, 0, 2]] + [0, 0, 8] * np.sin(30.0 * p[:, :1]),
+            ),
+            "axes base and shoulder: exchanged",  # whatever else moves the elbow
+        ),
     ],
 )
 def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
