@@ -51,7 +51,7 @@ def misassigned(model: MachineModel, log: Log) -> str | None:
     most = int(np.argmin(falls))
     before, after = (100.0 * float(each[most]) ** 0.5 for each in (parts, left))
     return (
-        f"{said} bodies and friction would leave {after:.0f} % of the torque of {going[most]}, in "
+        f"{said}, bodies and friction would leave {after:.0f} % of the torque of {going[most]}, in "
         f"place of {before:.0f} %; correct the import map, or the file"
     )
 
