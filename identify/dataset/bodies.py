@@ -19,7 +19,6 @@ from twin.model.machine import MachineModel
 from twin.parallel import spread
 from twin.signals import Array, between, local_parabola
 
-OF_JOINT = 0.02  # s, over which a joint's position is a parabola that tells its velocity
 PIECE = 1 << 12  # samples whose motion is held at once; of 40 joints it takes 10 MB
 
 
@@ -159,7 +158,8 @@ def _require_joints(axes: Sequence[str], model: MachineModel, log: Log, name: st
 
 def _smoothed_over(period: float, count: int) -> int:
     """Samples, odd, over which the motion of ``count`` samples of a joint is smoothed."""
-    samples = min(max(round(OF_JOINT / period), 5), count - 1)
+    # 0.02 s, over which a joint's position is a parabola that tells its velocity
+    samples = min(max(round(0.02 / period), 5), count - 1)
     return samples - (1 - samples % 2)
 
 

@@ -17,7 +17,6 @@ from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
-TRIED = 8.0  # s of motion on which nonlinear parameters are scanned before all of it is used
 ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
 
 
@@ -105,7 +104,8 @@ class Dataset:
     @cached_property
     def heads(self) -> tuple[PreparedLog, ...]:
         """The beginnings of the training logs, long enough to scan nonlinear parameters on."""
-        each = TRIED / min(len(self.fit), 4)  # less of a log tells little
+        # 8 s of motion on which nonlinear parameters are scanned before all of it is used
+        each = 8.0 / min(len(self.fit), 4)  # less of a log tells little
         return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
 
     @cached_property

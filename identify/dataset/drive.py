@@ -22,8 +22,6 @@ from twin.signals import between, local_parabola
 
 Array = NDArray[np.float64]
 
-LESSENED = 0.5  # of the commanded force; below it errors are divided by actual over commanded
-SAME_STEP = 0.9  # of the step that logs show, from which an encoder's is that
 PASSES = 3  # iterations from a reading to the true position
 
 
@@ -39,7 +37,8 @@ def is_noise(effect: Effect) -> bool:
 
 def knows_rounding(axis: AxisModel, motions: Sequence[Motion]) -> bool:
     """Whether an axis rounds readings as these logs are: by an effect, or by its encoder's step."""
-    step = SAME_STEP * max(m.resolution for m in motions)
+    # 0.9 of the step that logs show, from which an encoder's is that
+    step = 0.9 * max(m.resolution for m in motions)
     return axis.hardware.encoder_resolution >= step > 0.0 or any(
         is_noise(f.effect) for f in axis.effects
     )
@@ -68,7 +67,8 @@ def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
     asked = np.concatenate([m.command for m in motions])
     given = asked + np.concatenate([_added(part, m, m.signals, m.period) for m in motions])
     ratio = np.linalg.norm(given) / max(np.linalg.norm(asked), np.finfo(float).tiny)
-    return 1.0 if ratio >= LESSENED else max(float(ratio), 1e-6)
+    # 0.5 of the commanded force; below it errors are divided by actual over commanded
+    return 1.0 if ratio >= 0.5 else max(float(ratio), 1e-6)
 
 
 def _added(actuation: AxisModel, motion: Motion, signals: Array, period: float) -> Array:

@@ -19,7 +19,6 @@ Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
 WINDOWS = 8  # of the shorter of two logs, evenly spaced, that are sought in the longer one
-CELLS = 1000.0  # into which the range of positions is divided
 CROSSED = 32  # of which so many are entered within a window
 READ_IF_LOGGED = ("velocity", "setpoint_position")
 BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
@@ -152,7 +151,8 @@ def _with_motion(position: Array) -> Iterator[tuple[slice, int]]:
     span, least = float(np.ptp(position)), len(position) // WINDOWS
     if not 0.0 < span < np.inf:
         return
-    entered = np.flatnonzero(np.diff(np.floor(position * (CELLS / span)))) + 1
+    # 1000 cells, into which the range of positions is divided
+    entered = np.flatnonzero(np.diff(np.floor(position * (1000.0 / span)))) + 1
     starts = np.linspace(0, len(position) - least, WINDOWS).astype(int)
     ends = np.searchsorted(entered, starts) + CROSSED - 1
     for start, end in zip(starts, ends, strict=True):

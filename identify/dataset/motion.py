@@ -26,7 +26,6 @@ from twin.model.machine import MOST_AXES_OF_A_PAIR
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise
 
-READ_BACK = 32  # readings that a controller is supposed to use
 SMOOTHED = 11  # samples over which readings are smoothed to undo their errors
 
 SHORTEST_BLOCK = 1e-3  # s
@@ -243,7 +242,7 @@ class Motion:
         """
         velocity, command = self.raw[:, :ENOUGH]
         command, bend = np.diff(command, 2), np.diff(velocity)
-        lags = min(READ_BACK, len(command) // 8)
+        lags = min(32, len(command) // 8)  # readings that a controller is supposed to use
         past = sliding_window_view(bend[: len(command)], lags)
         scale = np.sqrt(np.mean(past**2)) or 1.0
         rows, wanted = past / scale, command[lags - 1 :]

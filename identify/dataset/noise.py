@@ -37,10 +37,8 @@ from identify.dataset.test_function import TestFunction
 from twin.model.machine import AxisModel
 from twin.signals import Array, between
 
-SEGMENT = 0.25  # s; short, so that most segments hold neither a reversal nor a spike
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 HALF = 0.25  # of the sample rate: beyond, a command has no motion, a measured velocity little noise
-LOUDER = 2.0  # times the power of the quietest log, beyond which it is no noise: estimates scatter
 PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
 COHERENT = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
 SHOWN = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
@@ -90,7 +88,8 @@ def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...
     for own, motion in zip(noises, motions, strict=True):
         alike = [m.sample_period == motion.sample_period for m in motions]
         low = min(n.most for n, same in zip(noises, alike, strict=True) if same)
-        force = low if own.force > LOUDER * low else own.force
+        # 2 times the power of the quietest log, beyond which it is no noise: estimates scatter
+        force = low if own.force > 2.0 * low else own.force
         out.append(replace(own, force=force, folded=own.folded if thinned else 0.0))
     return tuple(out)
 
@@ -103,7 +102,8 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     # friction then balances the command and its noise, whatever they are.
     still = stands(motion)
     rests = np.repeat(still & sticks(axis), motion.raw.shape[1] // len(still))[1:]
-    segment = min(max(round(SEGMENT / dt), 256), len(raw))
+    # 0.25 s; short, so that most segments hold neither a reversal nor a spike
+    segment = min(max(round(0.25 / dt), 256), len(raw))
     frequency, power = median_spectrum(raw, segment, dt, rests)
     half = np.cos(np.pi * frequency * dt) ** 2
     gain = (rate_gain(frequency, dt) * axis.mass) ** 2

@@ -37,7 +37,6 @@ SCATTER = 0.1  # of a part's RMS, by which its estimate misses it; see tests of 
 OF_ROUNDING = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
 PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
 HARMONICS = 8  # that hold 93 % of the power; others are taken as white
-WIDEST = 501  # samples that tell a speed to a 10^-4 of a step a sample; more would take time
 
 _PARTS: WeakKeyDictionary[PreparedLog, dict[tuple[bool, int], tuple[float, float]]]
 _PARTS = WeakKeyDictionary()
@@ -217,7 +216,8 @@ def _parts(log: PreparedLog, sticks: bool, segment: int) -> tuple[float, float]:
 def _uneven(log: PreparedLog) -> tuple[Array, Array]:
     """By what readings stray from an even motion, squared steps, and its steps a sample: (n,)."""
     readings, step = log.motion.readings, log.motion.resolution
-    width = (min(len(log.fine.weights), WIDEST) - 1) | 1
+    # 501 samples that tell a speed to a 10^-4 of a step a sample; more would take time
+    width = (min(len(log.fine.weights), 501) - 1) | 1
     path = local_parabola(readings, width)
     sums = np.cumsum(np.pad(((readings - path) / step) ** 2, (width // 2 + 1, width // 2)))
     square = (sums[width:] - sums[:-width]) / width

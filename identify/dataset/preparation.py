@@ -35,8 +35,6 @@ from twin.model.machine import MachineModel
 from twin.parallel import spread
 
 LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
-MARGIN = 0.05  # of the range of the training logs, by which a log of another role may exceed it
-LEAST_SHARED = 0.2  # part of the logs of a role that must lie within it
 
 
 def datasets(
@@ -147,10 +145,12 @@ def _within_reach(
     where they have little in common with the training logs.
     """
     low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
-    margin = MARGIN * (high - low)
+    # 0.05 of the range of the training logs, by which a log of another role may exceed it
+    margin = 0.05 * (high - low)
     reach = (low - margin, high + margin)
     within = spread(lambda m: PreparedLog.of(m, length, reach), motions)
-    if sum(np.count_nonzero(w.reached) for w in within) < LEAST_SHARED * sum(map(len, within)):
+    # 0.2 of the logs of a role must lie within it
+    if sum(np.count_nonzero(w.reached) for w in within) < 0.2 * sum(map(len, within)):
         return tuple(PreparedLog.of(m, length) for m in motions)
     return tuple(within)
 

@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 
 Reach = tuple[float, float]  # lowest and highest position, m
 EVERYWHERE: Reach = (-np.inf, np.inf)
-SURE_REST = 3.0  # standard deviations of the readings' noise, by which a motion is more than it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,7 +141,8 @@ def stands(motion: Motion) -> NDArray[np.bool_]:
     """
     still = at_rest(motion.velocity)
     least = REST_SPEED * float(np.abs(motion.velocity).max()) * motion.period
-    noise = SURE_REST * np.sqrt(2.0) * motion.position_noise
+    # 3 standard deviations of the readings' noise, by which a motion is more than it
+    noise = 3.0 * np.sqrt(2.0) * motion.position_noise
     over = min(int(noise / least) + 1, len(still)) if least > 0.0 else 1
     if over > 1:
         gone = np.cumsum(np.pad(motion.velocity * motion.period, (1, 0)))

@@ -36,7 +36,6 @@ LEAST = 0.01  # share of the differences' variance that a line takes; a weaker o
 OUTLIER = 20.0  # times the usual size, to which larger differences are cut
 FINEST_CYCLES = 1 << 18  # over the travel
 SPEEDS = 10  # ranges of speed in which a line over the position is looked for
-SEGMENT = 4096  # samples of the spectra at most; long, as a quiet velocity shows at low frequencies
 ALIKE = 0.02  # largest relative difference of a measured velocity from the rate of the position
 LATEST = 0.01  # s, that it may be late
 
@@ -239,7 +238,8 @@ def _weight(difference: Array, period: float, noise: float) -> float:
 
     0 where the difference does not show the position's own noise (m rms).
     """
-    segment = min(SEGMENT, len(difference) // 4)
+    # 4096 samples of the spectra at most; long, as a quiet velocity shows at low frequencies
+    segment = min(4096, len(difference) // 4)
     frequency, power = median_spectrum(
         difference, segment, period, np.zeros(len(difference), dtype=bool)
     )

@@ -27,13 +27,9 @@ from twin.parallel import spread
 from twin.signals import Array
 
 MOST_LINES = 24
-CELLS_A_PERIOD = 4  # of the highest frequency, where samples are not equally spaced
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 BAND = 20  # resolutions whose median tells the level of the spectrum
-LEAST_KEPT = 0.25  # of the segments, where an axis rests in most
-MOST_SEGMENTS = 64  # whose median is sure enough: with as many frequencies, to 1 % of the power
 ROUNDS, RESTING = 12, 1e-4  # of least squares, at most; the relative change of levels that rest
-TOLERATED = 0.5  # log of power over fit at which a frequency has half its weight
 
 
 def pieces_of(signal: NDArray[Any], samples: int) -> NDArray[Any]:
@@ -66,8 +62,10 @@ def median_spectrum(
     Medians are biased, see B. Allen et al., Phys. Rev. D 85, 122006 (2012).
     """
     out = pieces_of(left_out, segment).mean(axis=1)
-    usable = np.flatnonzero(out <= np.quantile(out, LEAST_KEPT))
-    pieces = pieces_of(signal, segment)[usable[:: -(-len(usable) // MOST_SEGMENTS)]]
+    # 0.25 of the segments, where an axis rests in most
+    usable = np.flatnonzero(out <= np.quantile(out, 0.25))
+    # The median of 64 is sure enough: with as many frequencies, to 1 % of the power
+    pieces = pieces_of(signal, segment)[usable[:: -(-len(usable) // 64)]]
     ramp = np.linspace(-1.0, 1.0, segment)
     slope = (pieces @ ramp) / (ramp @ ramp)
     power = densities(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp), dt)
@@ -87,7 +85,8 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
     least = np.maximum(np.minimum.accumulate(power[::-1])[::-1], np.finfo(float).tiny)
     model, levels = least, np.zeros(shapes.shape[1])
     for _ in range(ROUNDS):
-        above = np.maximum(np.log(power / model), 0.0) / TOLERATED
+        # A frequency whose log of power over fit is 0.5 has half its weight
+        above = np.maximum(np.log(power / model), 0.0) / 0.5
         weight = 1.0 / (1.0 + above**2)
         before = levels
         levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
@@ -238,7 +237,8 @@ class _Grid:
         even = first > 0.0 and all(
             np.allclose(np.diff(r.coordinate), first, atol=0.0) for r in records
         )
-        cell = first if even else 1.0 / (CELLS_A_PERIOD * highest)
+        # 4 a period of the highest frequency, where samples are not equally spaced
+        cell = first if even else 1.0 / (4 * highest)
         cells = fast_length(int(np.ceil(max(r.span for r in records) / cell)) + 1)
         along = [(r.coordinate - r.coordinate.min()) / r.span for r in records]
         return cls(

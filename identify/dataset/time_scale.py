@@ -22,7 +22,6 @@ from twin.signals import Array
 TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
 QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
 SHOWS = 2.0  # times the noise floor, and what a quiet length shows, from which a force shows
-LONGEST = 0.1  # of a log, that a beginning may last
 FOREIGN = 10.0  # times the RMS of what is left of the force later on
 HELD = 0.1  # of the force itself
 
@@ -141,7 +140,7 @@ def beginnings(motions: Motions) -> dict[str, float]:
     columns, forces, test_functions = regressors(motions, LOOK)
     times = [w.mean(m.time) for m, w in zip(motions, test_functions, strict=True)]
     logs = np.repeat(np.arange(len(motions)), [len(t) for t in times])
-    ends = [LONGEST * float(m.time[-1]) for m in motions]
+    ends = [0.1 * float(m.time[-1]) for m in motions]  # of a log, that a beginning may last
     late = np.concatenate([t > end for t, end in zip(times, ends, strict=True)])
     gains = np.linalg.lstsq(columns[:, late].T, forces[late], rcond=None)[0]
     left = np.abs(forces - columns.T @ gains)

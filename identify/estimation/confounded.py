@@ -28,10 +28,7 @@ from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
 
-LEAST_FORCE = 0.1  # of the error before the fit: least force of a change that is reported
 SAME_FORCE = 0.01  # largest part of that force outside the span of an effect with the same force
-MOST_CHANGES = 3  # that are reported
-HEAD = 4.0  # s of the first log, on which most effects show that they are none of the alike
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,8 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     moved = np.flatnonzero(np.abs(after - before) > half_widths(fit))
     backs = _backs(fit, moved, before - after)
     found = sorted(zip(map(rms, backs), moved, backs, strict=True), key=lambda t: -t[0])
-    found = [t for t in found if t[0] > LEAST_FORCE * error][:MOST_CHANGES]
+    # 0.1 of the error before the fit: least force of a change that is reported
+    found = [t for t in found if t[0] > 0.1 * error][:3]  # no more are reported
     alike = _alike(fit, catalogue, [back for *_, back in found])
     told = []
     for (force, j, _), names in zip(found, alike, strict=True):
@@ -101,7 +99,8 @@ def _alike(fit: Fit, catalogue: Catalogue, forces: Sequence[Array]) -> list[tupl
     """
     found: list[list[str]] = [[] for _ in forces]
     whole = fit.logs[0]
-    head = PreparedLog.of(whole.motion.head(HEAD), whole.test_function.length)
+    # 4 s of the first log, on which most effects show that they are none of the alike
+    head = PreparedLog.of(whole.motion.head(4.0), whole.test_function.length)
     first = fit.kept[: len(head)]
 
     def is_made(force: Array, basis: Array) -> bool:

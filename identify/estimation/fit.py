@@ -29,10 +29,6 @@ from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 
 MOST_EVALUATIONS = 40
-ROUGHLY = 1e-3  # relative fall of the squared error, at which the priors are weighed again
-NEGLIGIBLE = 1e-3  # twice a gain in log likelihood, below which a fit has converged
-PRIOR_FORCE = 0.1  # expected force of an effect beside the friction, over the force to explain
-UNSEEN = 1e-3  # of the force of another strength of the effect, below which one is not excited
 PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20, and of
 # static friction beyond the Coulomb friction over that
 LINES = 6  # of a spectrum that are looked at, the surest first
@@ -193,7 +189,8 @@ def fit_axis(
         left = problem.force(internal)
         before, basis = rms(left), orthonormal(problem.columns(internal))
         samples = problem.set_priors(internal, unabsorbed(left, basis))
-        internal, converged = problem.solve(internal, NEGLIGIBLE / samples)
+        # 1e-3 is twice a gain in log likelihood, below which a fit has converged
+        internal, converged = problem.solve(internal, 1e-3 / samples)
         if not rms(problem.force(internal)) < RULE.fallen * before:
             break
     return _ended(problem, internal, converged)
@@ -212,7 +209,8 @@ def _begun(
     internal = problem.start
     if len(internal):
         problem.set_priors(internal, problem.force(internal))
-        internal, _ = problem.solve(internal, ROUGHLY)
+        # 1e-3 is a relative fall of the squared error, at which the priors are weighed again
+        internal, _ = problem.solve(internal, 1e-3)
     return problem, internal
 
 
@@ -352,11 +350,13 @@ class FitProblem:
         noise = rms(left) * np.sqrt(len(left) / samples)
         columns = self.columns(internal)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(max(len(left), 1))
-        expected = max(PRIOR_FORCE * explained, noise)
+        # 0.1 of the force to explain is expected of an effect beside the friction
+        expected = max(0.1 * explained, noise)
         alike = np.zeros(len(size))
         np.maximum.at(alike, self.alike, size)
         alike = alike[self.alike]
-        unseen = self.added & (size < UNSEEN * alike)
+        # 1e-3 of the force of another strength of the effect, below which one is not excited
+        unseen = self.added & (size < 1e-3 * alike)
         self.centre = np.where(unseen, self.start, self.neutral)
         self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
         self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD

@@ -40,8 +40,6 @@ _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
 STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
-LEAST_PART = 1e-3  # of what is usual, by which a smaller value is stepped as if it were that large
-SHARPENED = 2  # times that a load is made to have the means by test functions that it is of
 AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 
 
@@ -132,7 +130,8 @@ def _sharpened(means: Array, log: PreparedLog) -> Array:
         return np.stack([np.interp(log.motion.time, log.time, own) for own in each])
 
     out = on_blocks(means)
-    for _ in range(SHARPENED):  # the means smooth it
+    # Twice the load is made to have the means by test functions that it is of
+    for _ in range(2):  # the means smooth it
         out += on_blocks(means - log.test_function.mean(out))
     return out
 
@@ -392,7 +391,8 @@ def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
     """
     p = c.parameter
     usual = scale.size(p.unit) if has_size(p.unit) else min(p.upper - p.lower, 1.0)
-    size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), LEAST_PART * usual))
+    # 1e-3 of what is usual, by which a smaller value is stepped as if it were that large
+    size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), 1e-3 * usual))
     return size if value + size <= p.upper else -size
 
 

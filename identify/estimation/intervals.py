@@ -36,7 +36,6 @@ QUANTILE = students_t(RULE.chance, BLOCKS - 1)
 AT_ONCE = 16  # estimates whose influences are held, as many are as large as the Jacobian
 GROUPS = 10  # of like influence; wide, as a law differs from the machine's over wide stretches
 FAR = 4.0  # half widths to either side at which the error must have risen
-LEAST_RISE = 0.1  # of the rise that the linearised residual predicts
 # Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
 # missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
 # floor beside a missing effect of 2 floors, 54 held the truth (seeds 740161991 and 1528482097).
@@ -168,7 +167,8 @@ def open_sides(fit: Fit, where: Sequence[ParameterReference], half: Array) -> di
         column = fit.jacobian[:, fit.scaling.where.index(c)]
         predicted = 2.0 * step * float(fit.residual @ column) + step**2 * float(column @ column)
         rise = 2.0 * float(fit.residual @ change) + float(change @ change)
-        if predicted > 0.0 and rise < LEAST_RISE * predicted:
+        # 0.1 of the rise that the linearised residual predicts
+        if predicted > 0.0 and rise < 0.1 * predicted:
             out.setdefault(c.label, side)
     return out
 

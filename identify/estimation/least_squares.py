@@ -22,7 +22,6 @@ import numpy as np
 from twin.signals import Array
 
 FIRST_DAMPING = 1e-2
-MOST = 0.75  # of the fall that the columns promise: kept, the next step may trust them more
 MOST_EVALUATIONS = 100  # of a search that is only to end
 RIDGE = 1e-4  # of a column's length, which keeps what is not excited, or explained twice, finite
 ROUNDING = 1e-12  # of a sum of squares: what thousands of terms of rounding leave of nothing
@@ -69,7 +68,8 @@ def minimise(
         if trial_cost <= cost:
             promised = cost - _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
-            good = cost - trial_cost > MOST * max(promised, EXACT * cost)
+            # 0.75 of the fall that the columns promise: kept, the next step may trust them more
+            good = cost - trial_cost > 0.75 * max(promised, EXACT * cost)
             if fall < tolerance and exact:
                 return Solution(moved, True)
             if good and fall >= tolerance:

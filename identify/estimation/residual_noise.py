@@ -35,13 +35,10 @@ from twin.model.machine import AxisModel
 from twin.signals import Array
 
 HATS = 16  # knots of a curve over a coordinate; finer ones would learn the noise
-LAGS = (1, 2, 4, 8, 16, 32, 64)  # test functions, by which what moved before may act
 MOVED = ("velocity", "acceleration", "direction")
-RIDGES = (0.01, 1.0)  # of a column's square: for many samples, and for few that slow noise leaves
 CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
 SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
 ALIKE = 1.5  # times the error of the training logs that noise may have on others
-MOST = 0.5  # of the force, RMS: a larger rest is of another machine
 GAUSSIAN, LAPLACE = 3.0, 6.0  # kurtosis of these noises
 
 
@@ -126,7 +123,8 @@ class Remainder:
         own = squares.sum(axis=0).diagonal().mean() * np.eye(columns.shape[1])
         others = squares.sum(axis=0) - squares, products.sum(axis=0) - products
         parts = []
-        for ridge in RIDGES:
+        # 0.01, 1 of a column's square: for many samples, and for few that slow noise leaves
+        for ridge in (0.01, 1.0):
             learned = np.linalg.solve(others[0] + ridge * own, others[1])
             told = 2.0 * products - squares @ learned
             parts.append(np.sum(learned * told, axis=(0, 1)))
@@ -156,7 +154,8 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
     logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once foretells nothing
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
-    if len(logs) == 1 or fit.error > MOST * rms(command):
+    # 0.5 of the force, RMS: a larger rest is of another machine
+    if len(logs) == 1 or fit.error > 0.5 * rms(command):
         return False
     trim_memory()  # matrices of all logs follow
     rest = Remainder.of(fit, logs)
@@ -215,7 +214,7 @@ def _past(where: dict[str, Array], logs: NDArray[np.int64]) -> Array:
     moved = np.stack([where[name] for name in MOVED], axis=1)
     moved /= np.maximum(np.sqrt(np.mean(moved**2, axis=0)), np.finfo(float).tiny)
     parts = []
-    for lag in LAGS:
+    for lag in (1, 2, 4, 8, 16, 32, 64):  # test functions, by which what moved before may act
         late = np.roll(moved, lag, axis=0)
         late[np.roll(logs, lag) != logs] = 0.0
         late[:lag] = 0.0

@@ -23,7 +23,6 @@ from twin.signals import Array
 
 Limits = tuple[float, float]
 
-BEYOND = 4.0  # times the travel or the top speed: what is longer or faster shows as a constant
 DECADES = 1e9  # a scale is sought within this factor of what is usual, as good as everywhere
 AT_EDGE = float(np.sqrt(np.finfo(float).eps))  # of a bound, within which a value is at it
 
@@ -37,7 +36,8 @@ def limits_of(p: Parameter, value: float, scale: Scale) -> Limits:
         return p.lower, p.upper
     force, length, _ = dimension(p.unit)
     usual = scale.size(p.unit)
-    most = BEYOND if (force, length) == (0, 1) else DECADES
+    # 4 times the travel or the top speed: what is longer or faster shows as a constant
+    most = 4.0 if (force, length) == (0, 1) else DECADES
     low, high = max(p.lower, usual / DECADES), min(p.upper, usual * most)
     return min(low, value), max(high, value)
 

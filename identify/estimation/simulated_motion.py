@@ -40,11 +40,7 @@ from twin.signals import Array
 STARTS = 4  # of the search: the axis as given, and places around it
 AROUND = 0.1  # standard deviation of those, in parts of each value
 FIRST_EVALUATIONS = 10  # of the search from each, after which the best goes on with all
-MOST_COMPARED = 20_000  # samples of a log
-MOST_WEIGHINGS = 6  # of the beginnings against the error, which falls on the way
-FALLS = 0.9  # of the error, above which the weights are right
 PROBE = 1e-2  # of the error, by which a difference step should change the position
-TURNS = 4  # tries to find such a step
 FIRST_STEP = 1e-4  # of a value
 TOLERANCE = 1e-6  # relative fall of the squared error, below which the search ends
 ROUGH = 100.0  # times the noise of the readings, above which the error is the model's, and rough
@@ -219,7 +215,7 @@ class _Problem:
                 run.error(axis, begin)
                 for run, begin in zip(self.runs, self.beginnings_at(internal), strict=True)
             ]
-        return [e[:: -(-len(e) // MOST_COMPARED)] for e in errors]
+        return [e[:: -(-len(e) // 20_000)] for e in errors]  # so many samples of a log
 
     def rows(self, internal: Array) -> Array:
         """(n,) m; not finite where the motion is not."""
@@ -242,7 +238,7 @@ class _Problem:
         out = np.empty((len(base), len(internal)))
         wanted = PROBE * max(rms(base), LEAST_READING)
         for i in range(len(internal)):
-            for _ in range(TURNS):
+            for _ in range(4):  # tries to find such a step
                 step = self.steps[i]
                 if internal[i] + step > self.bounds[1][i]:
                     step = -step
@@ -265,11 +261,12 @@ class _Problem:
         First as if that error were white, which lets them move; at the end by its colour, lest they
         make up for a model that is wrong.
         """
-        for _ in range(MOST_WEIGHINGS):
+        for _ in range(6):  # of the beginnings against the error, which falls on the way
             before = self.error(internal)
             self.weigh(internal, white=True)
             internal = self.solve(self.off_bounds(internal), MOST_EVALUATIONS).x
-            if not self.error(internal) < FALLS * before:
+            # 0.9 of the error, above which the weights are right
+            if not self.error(internal) < 0.9 * before:
                 break
         self.weigh(internal, white=False)
         return self.solve(internal, MOST_EVALUATIONS)

@@ -18,11 +18,9 @@ from twin.signals import Array
 
 FEWEST_CYCLES = 3  # over the travel
 MOST_CYCLES = 120  # over the travel, of the first look
-MOST_SAMPLES = 4000  # that the first look takes
 MOST_PEAKS = 6
 MOST_LINES = 3
 AT_ONCE = 32  # waves that are held; all of them take 45 MB
-EVERY = 1.0  # false-alarm probability up to which a line is tried
 
 
 def spatial_periods(
@@ -36,12 +34,12 @@ def spatial_periods(
     span = float(np.ptp(position))
     if span == 0.0 or not force.any():
         return ()
-    thin = slice(None, None, -(-len(force) // MOST_SAMPLES))
+    thin = slice(None, None, -(-len(force) // 4000))  # that the first look takes
     peaks = _peaks(position[thin], force[thin], weight[thin], columns[thin], span)
     highest = 0.25 * len(position) / span
     found = find_lines(
         [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
-        most=MOST_LINES, chance=EVERY,
+        most=MOST_LINES, chance=1.0,  # false-alarm probability up to which a line is tried
     )  # fmt: skip
     lines = (line.period for line in found)
     apart = [p for p in lines if all(abs(span / p - span / q) > 0.5 for q in peaks)]

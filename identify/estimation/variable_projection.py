@@ -30,7 +30,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 
-MANY_SHAPES = 50  # of which every other value is tried first, then what is beside the best
 FINALISTS = 4  # best shapes that are looked at more closely: beside them, on all of the logs
 REFINED_STARTS = 2  # best shapes of the scan that are worth a full refit
 
@@ -113,7 +112,7 @@ def _best(ground: _Ground, tried: Iterable[Start]) -> list[Start]:
 
 def _scanned(ground: _Ground, tried: Sequence[Start]) -> list[Start]:
     """All shapes, best first; of many every other value of each, and those beside the best."""
-    if len(tried) <= MANY_SHAPES:
+    if len(tried) <= 50:  # of which every other value is tried first, then what is beside the best
         return _best(ground, tried)
     grids = {name: sorted({s.shape[name] for s in tried}) for name in tried[0].shape}
 

@@ -32,8 +32,6 @@ from twin.model.machine import AxisModel
 
 Array = NDArray[np.float64]
 
-SURE = 0.85  # of a noise floor; of less error its estimate would be refuted
-MOST_INERTIA = 3.0  # times the moved mass of the base or its start, that an effect may leave
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
 NO_SCORE = "by one linear step it gains too little"
@@ -146,7 +144,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         if own_force and _is_of_the_file(alone, dataset):
             return "a tenth more or less of what the bodies of the file weigh could be it"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
-    if not any(m <= MOST_INERTIA * fit.axis.mass for m in masses):
+    # 3 times the moved mass of the base or its start, that an effect may leave
+    if not any(m <= 3.0 * fit.axis.mass for m in masses):
         return "it takes the place of the inertia"
     return None
 
@@ -193,7 +192,8 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     plain = Candidate(
         effect, dataset.axis, fit, Evidence(0.0, 1, fit.samples), Gain(error, error, 0.0)
     )
-    if not (RULE.least_part < part and SURE * floor < error):
+    # 0.85 of a noise floor; of less error its estimate would be refuted
+    if not (RULE.least_part < part and 0.85 * floor < error):
         return plain
     t = float(np.sqrt(max(effective_samples(left) * noise_gain(left, less, floor), 0.0)))
     taken = Taken(t, part, part)

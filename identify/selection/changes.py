@@ -32,10 +32,6 @@ from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
 
-HEAD_EVALUATIONS = 4  # of a friction fitted on the heads; more do not change which start is best
-MORE_EVALUATIONS = 12  # of the best of them, where it helps; frictions with a memory need them
-OTHER_EXPONENTS = (0.6, 1.5)  # times what a law holds by design, at which its exponent is tried
-
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -98,10 +94,12 @@ class Added:
         """Another friction, which no linear step puts in the place of one: a fit on the heads."""
         fit, heads = judged.fit, judged.dataset.heads
         old = _refitted_to_heads(fit, judged.dataset)
-        fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, HEAD_EVALUATIONS) for s in found]
+        # 4 evaluations: more do not change which start is best
+        fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, 4) for s in found]
         best = sorted(fits, key=lambda f: f.error)
         if best[0].error < old.error:
-            best[0] = fit_roughly(best[0].axis, heads, MORE_EVALUATIONS)
+            # 12 of the best one, where it helps: frictions with a memory need them
+            best[0] = fit_roughly(best[0].axis, heads, 12)
         both = moving(heads, sticks(old.axis) or sticks(best[0].axis))
         before, after = (float(np.mean(residual(f.axis, heads)[both] ** 2)) for f in (old, best[0]))
         return Look(self, part_of(before, after, old.floor**2), tuple(f.axis for f in best))
@@ -141,7 +139,8 @@ class Freed:
         """By the change of the residual at two other values: the law bends between them."""
         axis, free = judged.fit.axis, self.free(judged.fit.axis)
         law = free[self.name]
-        others = [{**law.values, self.parameter: r * self.held} for r in OTHER_EXPONENTS]
+        # 0.6, 1.5 times what a law holds by design, at which its exponent is tried
+        others = [{**law.values, self.parameter: r * self.held} for r in (0.6, 1.5)]
         axes = [free, *(axis.with_effect(replace(law, values=v)) for v in others)]
 
         def columns(logs: Sequence[PreparedLog]) -> list[Array]:

@@ -33,7 +33,6 @@ Falsify = Callable[[Array, np.random.Generator], Array]
 
 STRETCHES = 8  # of a log, each with a sign of its own
 SAME = 0.5  # of the square of shifted columns, from which they are in the span of the true ones
-COMPARED = 4  # shifts by which that is told
 TINY = np.finfo(float).tiny  # of what is nothing, as a column where the motion excites none
 
 
@@ -172,7 +171,7 @@ def _survives_shifts(columns: Sequence[Array]) -> bool:
     """Whether columns (m, j) of logs span about the same as themselves shifted in time."""
     own, rng = orthonormal(np.concatenate(columns)), np.random.default_rng(0)
     inside = []
-    for _ in range(COMPARED):
+    for _ in range(4):  # shifts by which that is told
         moved = np.concatenate([_shifted(c, rng) for c in columns])
         inside.append(float(np.sum((own.T @ moved) ** 2) / max(np.sum(moved**2), TINY)))
     return float(np.mean(inside)) > SAME

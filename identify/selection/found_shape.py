@@ -24,7 +24,6 @@ from twin.signals import Array
 BAND = NormalDist().inv_cdf(1.0 - RULE.chance)  # standard deviations, to each side
 UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
-SELDOM = 0.02  # of the most visited knot's weight, below which a knot is not drawn
 WEAK = 1e-6  # of the data's weight: smoothing under which a law's own force is read off
 
 
@@ -85,7 +84,8 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
         full = np.zeros((len(weights), len(own)))
         full[:, own] = weights
         visits = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", weights, gram, weights), 0.0))
-        been = np.where(visits > SELDOM * visits.max(), 1.0, np.nan)
+        # 0.02 of the most visited knot's weight, below which a knot is not drawn
+        been = np.where(visits > 0.02 * visits.max(), 1.0, np.nan)
         curves[name] = Drawn(
             assumed=been * (weights @ assumed),
             found=been * (weights @ (assumed + correction[own])),

@@ -37,8 +37,6 @@ from twin.effects import Catalogue
 from twin.memory import trim_memory
 from twin.progress import Progress, silent, within
 
-AS_MUCH = 0.66  # of the part of a free curve, whose ten numbers are any law's: it goes first
-
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -281,7 +279,8 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
 
     It has shown that something is missing, so none of them has to be the best of many by itself.
     """
-    least = AS_MUCH * curve.candidate.part
+    # 0.66 of the part of a free curve, whose ten numbers are any law's: it goes first
+    least = 0.66 * curve.candidate.part
     laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
     alone = (
         t if t.candidate.supported else judged_change(judged, t.look, t.judged.fit) for t in laws

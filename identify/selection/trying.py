@@ -41,7 +41,6 @@ from twin.progress import Progress, silent
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
-SETTLED = 0.999  # of the error, below which another refit is a better optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +199,8 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     if axis is None or best.candidate.part > NEARLY_ALL:
         return judged, tried
     refitted = refitted_on(axis, judged, judged)
-    if refitted.fit.error > SETTLED * judged.fit.error:
+    # 0.999 of the error, below which another refit is a better optimum
+    if refitted.fit.error > 0.999 * judged.fit.error:
         return judged, tried
     return refitted, [_scored_again(refitted, t) for t in tried]
 
