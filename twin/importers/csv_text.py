@@ -1,10 +1,12 @@
 """Text tables: delimiter, decimal sign, header and first row of numbers are found in the file.
 
-Lines above the header and a line of units below it are ignored. Where there is no header the
-columns are called "1", "2", ... An export of TwinCAT Scope is known by its own header, rows of a
-key and its value for each channel. Source: Beckhoff Infosys, TE13xx TwinCAT 3 Scope View, "Export
-to CSV". A column under the key is that of the times, in ms since the first sample or, as full time
-stamps, in 100 ns since 1601.
+Lines above the header are ignored. A unit in a line below it is part of the name, as in
+"Position [mm]"; "Position" finds the column as well. Where there is no header the columns are
+called "1", "2", ... Times may be stamps of ISO 8601, such as 2024-05-01 12:00:00.001.
+
+An export of TwinCAT Scope is known by its own header, rows of a key and its value for each channel.
+Source: Beckhoff Infosys, TE13xx TwinCAT 3 Scope View, "Export to CSV". A column under the key is
+that of the times, in ms since the first sample or, as full time stamps, in 100 ns since 1601.
 """
 
 from __future__ import annotations
@@ -12,9 +14,10 @@ from __future__ import annotations
 import codecs
 import csv
 import itertools
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +25,8 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, chosen, parsing
+from twin.importers.units import is_unit, raw_unit
+from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 TIME = "time"
 END = "EOF"  # the last line of an export, where it was asked for
@@ -31,6 +36,8 @@ _UNIX_EPOCH = 116_444_736_000_000_000  # in 100 ns since 1601
 _HEAD_BYTES = 1 << 16
 _SAMPLE_LINES = 20
 _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
+_UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"))
 
 
@@ -57,6 +64,13 @@ class _Style:
             return False
         return True
 
+    def is_stamp(self, cell: str) -> bool:
+        """Whether a cell is a date and a time."""
+        try:
+            return ":" in cell and _microseconds(cell.replace(self.decimal, ".")) > 0.0
+        except ValueError:
+            return False
+
     def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
         """Of the cells of ``lines``; 0 where there are fewer columns."""
         rows = [self.cells(line) for line in lines]
@@ -68,32 +82,67 @@ class _Style:
 
 @dataclass(frozen=True)
 class _Layout:
-    """skip: lines before the first row of numbers; sample_rate: Hz, start_ns: if stated."""
+    """skip: lines before the first row of numbers; sample_rate: Hz, start_ns: if stated.
+
+    first: the cells of that row. units: what the names have as units in a line of their own.
+    """
 
     encoding: str
     style: _Style
     names: tuple[str, ...]
     skip: int
+    first: Sequence[str]
+    units: tuple[str, ...] = ()
     sample_rate: float | None = None
     start_ns: int | None = None
+
+    def called(self, asked: Collection[str]) -> list[str]:
+        """The names of the columns, with their units unless they are asked for without."""
+        units = self.units or ("",) * len(self.names)
+        both = zip(self.names, units, strict=True)
+        return [f"{n} [{unit}]" if unit and n not in asked else n for n, unit in both]
+
+    def holds_numbers(self, column: int) -> bool:
+        """Whether its first cell is a number or a time."""
+        cell = self.first[column]
+        return self.style.is_number(cell) or self.style.is_stamp(cell)
 
 
 def read(path: Path, mapping: ImportMap) -> Table:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
         layout = _find_layout(path, mapping)
-        wanted = chosen(mapping.column_names(), layout.names)
-        where = [layout.names.index(name) for name in wanted]
+        asked = mapping.column_names()
+        names = layout.called(asked)
+        places = {name: names.index(name) for name in chosen(asked, names)}
+        text = {} if asked else {n: np.array(layout.first[k : k + 1]) for n, k in places.items()
+                                 if not layout.holds_numbers(k)}  # fmt: skip
+        where = [k for name, k in places.items() if name not in text]
+        stamps = {k for k in where if layout.style.is_stamp(layout.first[k])}
         try:
             with closing(_lines(path, layout)) as lines:
                 values = np.loadtxt(
                     lines, delimiter=layout.style.delimiter, usecols=where, comments=None,
-                    quotechar='"', ndmin=2, unpack=True,
+                    quotechar='"', ndmin=2, unpack=True, encoding=None,
+                    converters=dict.fromkeys(stamps, _microseconds),
                 )  # fmt: skip
         except ValueError as error:
-            raise _first_fault(path, layout, where) or InputError(str(error)) from error
-    columns = dict(zip(wanted, values, strict=True))
-    return Table(columns, layout.sample_rate, layout.start_ns)
+            raise _first_fault(path, layout, where, stamps) or InputError(str(error)) from error
+    read = dict(zip(where, values, strict=True))
+    for k in stamps:
+        read[k] = read[k].astype(np.int64).astype("datetime64[us]")
+    columns = {name: read[k] if name not in text else text[name] for name, k in places.items()}
+    return Table(columns, layout.sample_rate, layout.start_ns, layout.skip + 1)
+
+
+def _microseconds(stamp: str) -> float:
+    """Since 1970, of a date and a time, which are those of UTC where they state no zone.
+
+    They are whole and far below 2^53, so exact. Raises ValueError.
+    """
+    time = datetime.fromisoformat(stamp.strip())
+    aware = time if time.tzinfo else time.replace(tzinfo=UTC)
+    return float((aware - _EPOCH) // timedelta(microseconds=1))
 
 
 def _lines(path: Path, layout: _Layout) -> Generator[str]:
@@ -121,7 +170,18 @@ def _find_layout(path: Path, stated: ImportMap) -> _Layout:
     if (scope := _scope_layout(rows, encoding, style)) is not None:
         return scope
     skip = _first_row(rows, style, stated.header_line)
-    return _Layout(encoding, style, _names(rows, skip, stated.header_line), skip)
+    names, below = _names(rows, skip, stated.header_line)
+    return _Layout(encoding, style, names, skip, rows[skip], _units(rows[below:skip], names))
+
+
+def _units(rows: Sequence[Sequence[str]], names: Sequence[str]) -> tuple[str, ...]:
+    """Those in the first row between names and numbers that has some; "" of a column without."""
+    for row in rows:
+        cells = [cell.strip("[]() ") for cell in row]
+        units = [c if is_unit(c, *_UNITS_OF) or raw_unit(c) else "" for c in cells]
+        if any(units) and len(units) >= len(names) - 1:
+            return (*units, "")[: len(names)]
+    return ()
 
 
 def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -> _Layout | None:
@@ -158,7 +218,7 @@ def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -
             "those of one sample time at once"
         )
     rate = 1e3 / steps[0] if steps and steps[0] > 0.0 else None
-    return _Layout(encoding, style, tuple(names[:width]), first, rate, start_ns)
+    return _Layout(encoding, style, tuple(names[:width]), first, rows[first], (), rate, start_ns)
 
 
 def _encoding(head: bytes) -> str:
@@ -194,8 +254,13 @@ def _first_row(rows: Sequence[Sequence[str]], style: _Style, header_line: int | 
     )
 
 
-def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) -> tuple[str, ...]:
-    """Names of the columns: the topmost of the rows above the numbers that are as wide."""
+def _names(
+    rows: Sequence[Sequence[str]], skip: int, header_line: int | None
+) -> tuple[tuple[str, ...], int]:
+    """Names of the columns: the topmost of the rows above the numbers that are as wide.
+
+    With the index of the row below them.
+    """
     width = len(rows[skip])
     widths = (width, width - 1) if not rows[skip][-1] else (width,)  # rows may end in a delimiter
     if header_line is not None:
@@ -205,18 +270,20 @@ def _names(rows: Sequence[Sequence[str]], skip: int, header_line: int | None) ->
         while top > 0 and len(rows[top - 1]) in widths:
             top -= 1
         if top == skip and (skip == 0 or len(rows[skip - 1]) < 2):
-            return tuple(str(k + 1) for k in range(width))
+            return tuple(str(k + 1) for k in range(width)), skip
         top = min(top, skip - 1)
     if len(rows[top]) not in widths:
         raise InputError(
             f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
             "state header_line, delimiter or decimal in the map"
         )
-    return tuple(rows[top])
+    return tuple(rows[top]), top + 1
 
 
-def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputError | None:
-    """The first cell that is not a number."""
+def _first_fault(
+    path: Path, layout: _Layout, where: Sequence[int], stamps: Collection[int]
+) -> InputError | None:
+    """The first cell that is not a number, nor a time where the first row has one."""
     with open(path, encoding=layout.encoding, errors="replace") as stream:
         for number, line in itertools.islice(enumerate(stream, 1), layout.skip, None):
             if not line.strip():
@@ -226,9 +293,17 @@ def _first_fault(path: Path, layout: _Layout, where: Sequence[int]) -> InputErro
                 place = f"line {number}, column '{layout.names[index]}'"
                 if index >= len(cells) or not cells[index]:
                     return InputError(f"{place}: is empty; complete or cut out the row")
-                if not layout.style.is_number(cells[index]):
-                    return InputError(
-                        f"{place}: {cells[index]!r} is not a number; correct it, or state "
-                        "header_line, delimiter or decimal in the map"
-                    )
+                fits = layout.style.is_stamp if index in stamps else layout.style.is_number
+                if not fits(cells[index]):
+                    return InputError(f"{place}: {cells[index]!r} is not {_remedy(cells[index])}")
     return None
+
+
+def _remedy(cell: str) -> str:
+    """What a cell that is no number ought to be."""
+    if ":" in cell:
+        return (
+            "a number, nor a time such as 2024-05-01 12:00:00.001; correct it, or give "
+            "sample_rate (Hz) in place of time"
+        )
+    return "a number; correct it, or state header_line, delimiter or decimal in the map"

@@ -25,7 +25,6 @@ from twin.importers.table import Table, numbers
 from twin.logs.container import reading
 from twin.logs.log import HELD, Array, AxisLog, Log
 from twin.logs.series import instant, is_calendar
-from twin.numbers import first_not_finite
 
 Columns = Mapping[str, Array]
 Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint -> ratio
@@ -132,6 +131,9 @@ def _read(
     table = table_of(path, mapping)
     columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
     scalars = {n: _scalar(n, columns[n]) for n in mapping.scalars()}
+    for c in mapping.columns():
+        if hole := table.hole(c.name, columns[c.name]):
+            raise InputError(hole)
     signals = {c.name for c in mapping.columns()} | ({mapping.time.name} if mapping.time else set())
     columns = {n: c for n, c in columns.items() if n in signals}
     _common_length(columns)
@@ -151,13 +153,6 @@ def _scalar(name: str, values: Array) -> float:
 
 def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, str]) -> Log:
     """The log of columns that are sampled at ``rate`` (Hz); raises InputError."""
-    for name, values in columns.items():
-        if (k := first_not_finite(values)) is not None:
-            raise InputError(
-                f"column '{name}' is {values[k]} in row {k + 1} of {len(values)} "
-                f"({k / rate:.6g} s), {np.count_nonzero(~np.isfinite(values))} such rows in all; "
-                "cut them out or leave the signal out of the map"
-            )
     count = _common_length(columns)
     delays = [c.delay_samples for c in mapping.columns()]
     # samples for which every column, moved back by its delay, has a value

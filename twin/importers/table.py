@@ -16,6 +16,7 @@ from twin.entries import near
 from twin.errors import InputError
 from twin.logs.container import LARGEST_RATIO
 from twin.logs.log import Array
+from twin.numbers import first_not_finite
 
 _REAL = int | float | np.integer | np.floating
 _MOST_NAMES = 40  # columns listed in a message
@@ -24,11 +25,26 @@ SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 @dataclass(frozen=True)
 class Table:
-    """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them."""
+    """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them.
+
+    first_line: that of the first row, in a file of text.
+    """
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
     start_ns: int | None = None
+    first_line: int | None = None
+
+    def hole(self, name: str, values: Array) -> str | None:
+        """Where a column (n,) is not a finite number, and the remedy; None where it always is."""
+        if (k := first_not_finite(values)) is None:
+            return None
+        line = "" if self.first_line is None else f" (line {self.first_line + k})"
+        return (
+            f"column '{name}' is {values[k]} in row {k + 1} of {len(values)}{line}, "
+            f"{np.count_nonzero(~np.isfinite(values))} in all; complete or cut out such rows, or "
+            "leave the signal out of the map"
+        )
 
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:

@@ -92,6 +92,20 @@ def find_unit(text: str, *allowed: str) -> Unit:
     )
 
 
+def is_unit(text: str | None, *kinds: str) -> bool:
+    """Whether it is a unit of one of these quantities (SI units)."""
+    try:
+        return text is not None and find_unit(text, *kinds).si is not None
+    except InputError:
+        return False
+
+
+def raw_unit(text: str | None) -> str | None:
+    """The unit of no quantity in a text: the counts of "counts/s"; None where there is none."""
+    plain = (text or "").partition("/")[0]
+    return plain if plain in _RAW else None
+
+
 def _size_by_library(text: str, si: str) -> float | None:
     """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity."""
     if "rad" in si or not _WORD.search(text):  # angles have no dimension there: anything would do

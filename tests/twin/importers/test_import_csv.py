@@ -8,6 +8,7 @@ from import_cases import MAP, mapping, table
 
 from twin.errors import InputError
 from twin.importers import import_log
+from twin.importers.guess import guess_map
 from twin.logs import Log
 
 
@@ -52,6 +53,7 @@ NUMBERED = MAP.replace('"q"', "2").replace('"i"', "3")
         ("\n".join([HEADER, "s,mm,mA,-", *ROWS]), MAP),
         ("\n".join(ROWS), NUMBERED),
         (PLAIN.replace("t,q,i,unused", '"t","q","i","un,used"'), MAP),
+        ("\n".join([HEADER, "s,mm,mA,-", *ROWS]), MAP.replace('"q"', '"q [mm]"')),
         ("a,b,c,d\n1,2,3,4\n" + PLAIN, "header_line = 3\n" + MAP),
         ("\n".join([HEADER, *(row + "," for row in ROWS)]), "header_line = 1\n" + MAP),
         (PLAIN.replace("nan", "idle since noon"), 'delimiter = ","\n' + MAP),
@@ -75,7 +77,7 @@ def with_row(number: int, row: str) -> str:
         (with_row(40, "0.02,abc,1,0"), "line 41, column 'q': 'abc' is not a number"),
         (with_row(40, "0.02,,1,0"), "line 41, column 'q': is empty"),
         (with_row(40, "0.02"), "line 41, column 'q': is empty"),
-        (with_row(40, "0.02,nan,1,0"), r"column 'q' is nan in row 40 of 300 \(0.0195 s\), 1 such"),
+        (with_row(40, "0.02,nan,1,0"), r"column 'q' is nan in row 40 of 300 \(line 41\), 1 in all"),
         (PLAIN.replace("q,", "qq,"), "no column 'q'; did you mean 'qq'. columns: t, qq, i, unused"),
         (PLAIN.replace("t,", "q,", 1), "2 columns are called 'q'"),
         (PLAIN.replace(",unused", ""), "line 1 has 3 names, the rows have 4 cells"),
@@ -91,3 +93,31 @@ def test_what_cannot_be_read_is_named(tmp_path: Path, text: str | bytes, message
         imported(tmp_path, text)
     assert "log.csv" in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+CLOCKED = MAP.replace("sample_rate = 2000.0", 'time = {column = "t", unit = "s"}')
+
+
+def stamped(day: str, start: int = 0) -> str:
+    """The table with stamps of 0.5 ms in place of its times, the first so many ms in a minute."""
+    halves = (start * 1000 + 500 * k for k in range(len(ROWS)))
+    stamps = (f"{day} 12:00:{micro // 10**6:02d}.{micro % 10**6:06d}" for micro in halves)
+    rows = (f"{t},{row.partition(',')[2]}" for t, row in zip(stamps, ROWS, strict=True))
+    return "\n".join([HEADER, *rows])
+
+
+@pytest.mark.parametrize("day", ["2024-05-01", "1999-12-31"])
+def test_stamps_with_a_date_are_times(tmp_path: Path, day: str) -> None:
+    log = imported(tmp_path, stamped(day, 1900), CLOCKED)
+    assert log.sample_rate == 2000.0
+    expected = np.datetime64(f"{day}T12:00:01.900", "ns").astype(np.int64)
+    assert int(log.metadata["start_time_unix_ns"]) == expected
+    assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "log.csv").text
+
+
+def test_other_stamps_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"line 2, column 't': .* nor a time such as .*rate"):
+        imported(tmp_path, stamped("01.05.2024"), CLOCKED)
+    text = guess_map(tmp_path / "log.csv").text
+    assert "sample_rate = 1000.0 # Hz, ASSUMED" in text
+    assert "# not used: t (no numbers)" in text
