@@ -93,9 +93,11 @@ class Clock:
                 rms = float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
                 size = c.si.size * abs(float(c.scale)) * rms
                 each.append(f"{axis}.{field} {size:.2g} {entry.units[field]}")
-        dropped = f", {self.dropped} rows with a time that does not increase left out"
+        rows = "row" if self.dropped == 1 else "rows"
+        dropped = f", {self.dropped} {rows} with a time that does not increase left out"
+        spread = " to ".join(dict.fromkeys(f"{step:.3g}" for step in (steps.min(), steps.max())))
         return (
-            f"steps of {steps.min():.3g} to {steps.max():.3g} ms were resampled to "
+            f"steps of {spread} ms were resampled to "
             f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}; "
             f"error rms about {', '.join(each)}"
         )

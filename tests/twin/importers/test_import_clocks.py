@@ -34,10 +34,15 @@ def test_jittered_stamps_come_onto_one_clock_and_the_log_says_what_that_cost(tmp
     error = log.axes["x"].position - 0.03 * np.sin(9.0 * t)
     assert np.abs(error).max() < 2e-6
     said = log.metadata["resampled"]
-    assert "1 rows with a time that does not increase left out" in said
+    assert "1 row with a time that does not increase left out" in said
     cost = float(said.partition("x.position ")[2].split()[0])
     rms = float(np.sqrt(np.mean(error**2)))
     assert rms < cost < 10.0 * rms
+
+
+def test_even_steps_are_told_by_one_number(tmp_path):
+    columns = {n: np.insert(c, 1000, c[999]) for n, c in recording(jitter=0.0).items()}
+    assert imported(tmp_path, columns).metadata["resampled"].startswith("steps of 1 ms were ")
 
 
 @pytest.mark.parametrize(
