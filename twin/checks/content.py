@@ -17,7 +17,7 @@ ASSUMED = "ASSUMED"
 MAP = "import_map"  # entry of a log's metadata: the map as it was written
 _TABLE = re.compile(r"\[axes\.\"?(\w+)\"?\]")
 _ENTRY = re.compile(r"(\w+)\s*=\s*([^#]*)#(.*)")
-_UNIT = re.compile(r"unit\s*=\s*\"([^\"]*)\"")
+_UNIT = re.compile(r"unit\s*=\s*\"([^\"]*)\"(?:.*\bscale\s*=\s*([^\s,}]+))?")
 
 
 def check_content(axis: Axis) -> Iterator[Finding]:
@@ -73,7 +73,9 @@ def assumptions(map_text: str, axis: str) -> list[str]:
         if entry is None or ASSUMED not in entry[3] or table not in (None, axis):
             continue
         unit = _UNIT.search(entry[2])
-        found.append(f"{entry[1]} in {unit[1]}" if unit else f"{entry[1]} = {entry[2].strip()}")
+        scale = f" with scale = {unit[2]}" if unit and unit[2] else ""
+        what = f" in {unit[1]}{scale}" if unit else f" = {entry[2].strip()}"
+        found.append(entry[1] + what)
     return found
 
 

@@ -9,119 +9,37 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 
 from twin.errors import InputError
+from twin.importers.course import (
+    RATE,
+    Columns,
+    Leader,
+    Pair,
+    leaders,
+    likeness_to_rate,
+    means,
+    moved_by,
+    rate_of_another,
+    rates,
+)
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
-from twin.importers.table import numbers
-from twin.importers.units import find_unit
+from twin.importers.table import Table, numbers
+from twin.importers.units import find_unit, is_unit, raw_unit
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
-from twin.signals import between, rate
 
 _TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
 _TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
 _EVEN = 0.01  # of a step; what is less even needs resample
 _ALIKE = 0.1  # how far a velocity may be off the rate of its position to be in the same unit
-_SPAN = 0.01  # s over which a rate is taken
-_RATE = 0.9  # correlation of a column with the rate of another from which it is called that
-_FORCE = 0.3  # of the variance of a command that motion explains
-_FOLLOWS = 0.95  # correlation of a signal and its setpoint, at the lag of the loop
-_LOOP = 0.25  # s, largest lag of a loop that is followed at all
-
-Columns = Mapping[str, Array]
-Pair = tuple[str, str, float]  # a position, its rate, and their correlation
-
-
-def rate_of_another(columns: Columns, names: Sequence[str], step: float) -> Pair | None:
-    """A column, the one that is its rate, and their correlation; None where no two are so."""
-    found = [
-        (abs(_correlation(rates(columns[x], step), means(columns[v], step))), x, v)
-        for x, v in permutations(names, 2)
-    ]
-    how, position, velocity = max(found, default=(0.0, "", ""))
-    return (position, velocity, how) if how > _RATE else None
-
-
-@dataclass(frozen=True)
-class Leader:
-    """A column of the same course as a signal: its setpoint, or a second reading of it.
-
-    ahead: s, by which it is ahead of the signal. slope: how much of it is one of the signal.
-    """
-
-    name: str
-    likeness: float
-    ahead: float
-    slope: float
-
-
-def leaders(columns: Columns, names: Sequence[str], signal: Array, step: float) -> list[Leader]:
-    """Columns that have the course of a signal (k,), as of ``means``, the likest first.
-
-    At some lag of a loop. The force that moves a mass does not: it goes with the acceleration and,
-    by friction, with the sign of the velocity. That of a spring does, but in another size.
-    """
-    span = _width(step) * step
-    reach = min(round(_LOOP / span), len(signal) // 4)
-    found = []
-    for name in names:
-        other = means(columns[name], step)
-        count = min(len(signal), len(other)) - reach
-        own, lags = signal[reach:count], range(-reach, reach + 1)
-        shifts = [(_correlation(own, other[reach - k : count - k]), k) for k in lags]
-        likeness, ahead = max(shifts)
-        if likeness > _FOLLOWS:
-            slope = float(np.std(other) / np.std(signal))
-            found.append(Leader(name, likeness, ahead * span, slope))
-    return sorted(found, key=lambda leader: -leader.likeness)
-
-
-def moved_by(
-    columns: Columns, names: Sequence[str], position: Array, step: float
-) -> tuple[str, float] | None:
-    """The column that the motion explains best as a force, and the share of its variance."""
-    velocity, middle = rates(position, step), means(position, step)
-    acceleration, one = rate(velocity, _width(step) * step), np.ones_like(middle)
-    rows = np.column_stack([acceleration, velocity, np.sign(velocity), middle, one])
-    rows /= np.abs(rows).max(axis=0) + np.finfo(float).tiny
-    found = []
-    for name in names:
-        force = means(columns[name], step)
-        left = force - rows @ np.linalg.lstsq(rows, force, rcond=1e-10)[0]
-        found.append((1.0 - float(np.var(left) / np.var(force)), name))
-    share, best = max(found, default=(0.0, ""))
-    return (best, share) if share > _FORCE else None
-
-
-def _width(step: float) -> int:
-    return max(round(_SPAN / step), 1)
-
-
-def rates(column: Array, step: float) -> Array:
-    """(k,) rate over each span of 0.01 s, a second."""
-    return between(column[:: _width(step)], _width(step) * step)
-
-
-def means(column: Array, step: float) -> Array:
-    """(k,) mean over each such span."""
-    width = _width(step)
-    count = (len(column) - 1) // width
-    return np.asarray(column[: count * width].reshape(count, width).mean(axis=1))
-
-
-def _correlation(a: Array, b: Array) -> float:
-    n = min(len(a), len(b))
-    a, b = a[:n] - a[:n].mean(), b[:n] - b[:n].mean()
-    size = np.sqrt(float(a @ a) * float(b @ b))
-    return float(a @ b) / size if size > 0.0 else 0.0
-
+_NAMED = 0.3  # least correlation with the rate of a position of what is called one
 
 # Words that name a signal, the surest first.
 WORDS: Mapping[str, tuple[str, ...]] = {
@@ -136,8 +54,11 @@ ASKED = ("setpoint", "reference", "target", "desired", "demand", "command", "ref
 OTHER = ("act", "actual", "measured", "main", "axis", "data", "joint", "states", "state",
          "present")  # fmt: skip
 _TURNING = ("torque", "effort", "tau", "moment", "angle", "theta")
-_UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$|[_ ]([A-Za-z/0-9^]+)$")
+_UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$"
+                           r"|[_ ]([A-Za-z]+_s2?|[A-Za-z/0-9^]+)$")  # fmt: skip
 _FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken for the other unit
+# SI units a count that are assumed, of the size of an encoder's: 1 um and some thousand a turn
+_COUNT = {"m": 1e-6, "m/s": 1e-6, "rad": 1e-3, "rad/s": 1e-3}
 _COMMON = ("m", "mm", "um", "rad", "deg")  # units in which one column may be, its copy in another
 _AS_LARGE = 1.25  # times, by which a soft loop may miss the size of its setpoint
 _SURE = 1.06  # the same, where another unit must be what makes the difference,
@@ -165,8 +86,11 @@ def named(names: Sequence[str]) -> dict[str, Signal]:
     left = {name: words_of(bare(name)) for name in names}
     for field, words in WORDS.items():
         for asked in (False, True) if field in ("position", "velocity") else (False,):
+            key = f"setpoint_{field}" if asked else field
             fitting = []
             for name, own in left.items():
+                if _is_other(name, key):
+                    continue
                 places = [words.index(w) for w in own if w in words]
                 if asked and field == "position" and set(own) <= set(ASKED):
                     places.append(0)  # qg, goal: of what, is not said
@@ -175,7 +99,6 @@ def named(names: Sequence[str]) -> dict[str, Signal]:
             if fitting:
                 name = min(fitting)[1]
                 del left[name]
-                key = f"setpoint_{field}" if asked else field
                 found[key] = Signal(name, unit_in(name), "so called")
     return found
 
@@ -196,11 +119,18 @@ def signals_of(names: Sequence[str], columns: Columns, step: float) -> dict[str,
         left.remove(position)
     if "position" not in found:
         return found
+    measured = columns[found["position"].name]
+    for field in ("velocity", "setpoint_velocity"):
+        called = found.get(field)
+        if called and likeness_to_rate(measured, columns[called.name], step) < _NAMED:
+            left.append(found.pop(field).name)
     left = _with_setpoints(found, left, columns, step)
+    forces = [n for n in left if not (_is_other(n, "force") and _is_other(n, "current"))]
     known = {"force", "current"} & found.keys()
-    if not known and (moved := moved_by(columns, left, columns[found["position"].name], step)):
+    if not known and (moved := moved_by(columns, forces, measured, step)):
         why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
-        found["force"] = Signal(moved[0], unit_in(moved[0]), why)
+        unit = unit_in(moved[0])
+        found["current" if is_unit(unit, "A") else "force"] = Signal(moved[0], unit, why)
     return found
 
 
@@ -220,7 +150,7 @@ def _driven(columns: Columns, names: Sequence[str], step: float) -> tuple[str, s
 
     Of columns of one course the roughest is measured, and the others are its setpoints.
     """
-    best: tuple[float, str, list[str]] = (_RATE, "", [])
+    best: tuple[float, str, list[str]] = (RATE, "", [])
     for name in names:
         course = leaders(columns, [n for n in names if n != name], means(columns[name], step), step)
         alike = [name, *(leader.name for leader in course)]
@@ -287,23 +217,29 @@ def turns(found: Mapping[str, Signal]) -> bool:
     return any(set(words_of(signal.name)) & set(_TURNING) for signal in found.values())
 
 
-def unit_in(name: str) -> str | None:
-    """The unit that a name ends with; a word behind a blank or _ need not be one."""
+def unit_in(name: str, *kinds: str) -> str | None:
+    """The unit that a name ends with; a word behind a blank or _ need not be one.
+
+    kinds: SI units of what it may be, those of all signals if none.
+    """
     found = _UNIT_IN_NAME.search(name)
     bracketed, word = found.groups() if found else (None, None)
-    return bracketed or (word if word and is_unit(word, *_KINDS) else None)
+    word = (word or "").replace("_", "/")  # mm_s
+    counted = len(word) > 1 and raw_unit(word)  # one letter, or the number of an axis, is none
+    return bracketed or (word if counted or is_unit(word, *(kinds or _KINDS)) else None)
+
+
+def _is_other(name: str, field: str) -> bool:
+    """Whether the unit in a name is that of another signal; one letter is sure in brackets only."""
+    unit = unit_in(name) or ""
+    sure = len(unit) > 1 or name.endswith(("]", ")"))
+    own = LINEAR_UNITS[field], ROTARY_UNITS[field]
+    return sure and is_unit(unit, *_KINDS) and not is_unit(unit, *own)
 
 
 def bare(name: str) -> str:
     """A name less its unit; all of it where that is all."""
     return (_UNIT_IN_NAME.sub("", name) or name) if unit_in(name) else name
-
-
-def is_unit(unit: str | None, *kinds: str) -> bool:
-    try:
-        return unit is not None and find_unit(unit, *kinds).si is not None
-    except InputError:
-        return False
 
 
 def assumed(si: str, column: Array) -> str:
@@ -323,14 +259,16 @@ def guess_map(path: Path) -> Guess:
     """A map for a file of any of the formats; raises InputError where it has no columns."""
     with reading(path):
         table = table_of(path, EVERY_COLUMN)
-        columns = _distinct(table.columns)
+        columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
-    time = _time(columns)
-    clock, step = _clock(columns, time, table.sample_rate)
-    moving = {n: c for n, c in columns.items() if n != time and np.ptp(c) > 0.0}
+    counters = [n for n, c in columns.items() if _counts(n, c)]
+    time = _time({n: c for n, c in columns.items() if n not in counters})
+    clock, step = _clock(columns, time, counters, table.sample_rate)
+    moving = {n: c for n, c in columns.items() if n not in (time, *counters) and np.ptp(c) > 0.0}
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
-    lines, missing, used = [head, *clock], list[str](), {time}
+    lines, used = [head, *clock], {time}
+    missing = [holes[time]] if time in holes else []
     for axis, names in _axes(moving).items():
         found = signals_of(names, moving, step)
         lines += ["", f"[axes.{axis}]"]
@@ -342,10 +280,13 @@ def guess_map(path: Path) -> Guess:
         if "current" in found and "force" not in found:
             unit = "N m/A" if turns(found) else "N/A"
             lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
-        used |= {*names, *(signal.name for signal in found.values())}
-        unused = [n for n in names if n not in {signal.name for signal in found.values()}]
-        lines += [f"# not used: {', '.join(unused)}"] if unused else []
-    others = [_about(n, c) for n, c in table.columns.items() if n not in used]
+        taken = {signal.name for signal in found.values()}
+        unused = [n for n in names if n not in taken]
+        lines += [f"# not used: {n}, {_why_not(n, found, moving, step)}" for n in unused]
+        missing += [holes[n] for n in columns if n in holes and n in taken]
+        used |= {*names, *taken}
+    left = {n: c for n, c in table.columns.items() if n not in used}
+    others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]
     lines += ["", *(f"# not used: {other}" for other in others)] if others else []
     return Guess("\n".join(lines) + "\n", tuple(missing))
 
@@ -363,9 +304,24 @@ def _about(name: str, raw: np.ndarray) -> str:
     return f"{name} ({len(column)} rows, {column.min():.4g} to {column.max():.4g})"
 
 
-def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
-    """The columns of numbers, each once: an entry of an array that has a name goes by that."""
-    out: dict[str, Array] = {}
+def _why_not(name: str, found: Mapping[str, Signal], columns: Columns, step: float) -> str:
+    """Why a column of an axis is none of its signals."""
+    field = next(iter(named([name])), "")
+    if field in found:
+        return f"as {found[field].name} is taken for the {field}"
+    if field in ("velocity", "setpoint_velocity") and "position" in found:
+        position = found["position"].name
+        like = likeness_to_rate(columns[position], columns[name], step)
+        return f"as it does not go with the rate of {position} ({like:.2f})"
+    return "as neither its name nor its course tells what it is"
+
+
+def _distinct(table: Table) -> tuple[dict[str, Array], dict[str, str]]:
+    """The columns of numbers, each once, and where a straight line is across a hole in one.
+
+    An entry of an array that has a name goes by that.
+    """
+    raw, out, holes = table.columns, dict[str, Array](), dict[str, str]()
     named = {(n.rpartition(".")[0], np.asarray(c).tobytes()) for n, c in raw.items()}
     for name, values in raw.items():
         try:
@@ -373,10 +329,19 @@ def _distinct(raw: Mapping[str, np.ndarray]) -> dict[str, Array]:
         except InputError:
             continue
         again = name.endswith("]") and (name.rpartition("[")[0], values.tobytes()) in named
-        if len(column) > 2 and np.isfinite(column).all() and not again:
+        finite = np.flatnonzero(np.isfinite(column))
+        if len(column) > 2 and 2 * len(finite) > len(column) and not again:  # else of another clock
+            if hole := table.hole(name, column):
+                holes[name] = hole
+                column = np.interp(np.arange(len(column)), finite, column[finite])
             out[name] = column
     longest = max((len(c) for c in out.values()), default=0)
-    return {name: column for name, column in out.items() if len(column) == longest}
+    return {name: column for name, column in out.items() if len(column) == longest}, holes
+
+
+def _counts(name: str, column: Array) -> bool:
+    """Whether a column is the number of its row: that tells no time, unless in a unit of it."""
+    return unit_in(name, "s") is None and bool(np.all(np.diff(column) == 1.0))
 
 
 def _time(columns: Columns) -> str | None:
@@ -387,15 +352,18 @@ def _time(columns: Columns) -> str | None:
     return next(iter([*called, *even]), None)
 
 
-def _clock(columns: Columns, time: str | None, stated: float | None) -> tuple[list[str], float]:
+def _clock(
+    columns: Columns, time: str | None, counters: Sequence[str], stated: float | None
+) -> tuple[list[str], float]:
     """The lines of the clock, and the step in s."""
     if stated is not None:
         return [f"# the file states its sample rate: {stated:g} Hz"], 1.0 / stated
     if time is None:
-        return ["sample_rate = 1000.0 # Hz, ASSUMED: no column rises as times do"], 1e-3
+        why = f"{counters[0]} counts the rows" if counters else "no column rises as times do"
+        return [f"sample_rate = 1000.0 # Hz, ASSUMED: {why}"], 1e-3
     steps = np.diff(columns[time])
     step = float(np.median(steps[steps > 0.0]))
-    unit, reason = unit_in(time), "its name states the unit"
+    unit, reason = unit_in(time, "s"), "its name states the unit"
     if unit is None or not is_unit(unit, "s"):
         fits = [u for u, size in _TIME_SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
         unit = fits[0] if fits else "s"
@@ -436,6 +404,13 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
     units = ROTARY_UNITS if turns(found) else LINEAR_UNITS
     if is_unit(signal.unit, units[field]):
         return f"{field} = {_table(signal.name, signal.unit)} # {span}"
+    counted = raw_unit(signal.unit)
+    if position and field.endswith("velocity") and signal.unit in (None, f"{position.unit}/s"):
+        counted = raw_unit(position.unit)
+    if counted:
+        scale = _COUNT.get(units[field], 1.0)
+        entry = _table(signal.name, counted, scale)
+        return f"{field} = {entry} # {span}; scale ASSUMED: {units[field]} for one"
     unit, why = assumed(units[field], column), ""
     if field.endswith("velocity") and position is not None:
         base = position.unit or assumed(units["position"], columns[position.name])
@@ -447,8 +422,10 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
     return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"
 
 
-def _table(name: str, unit: str | None) -> str:
-    return f"{{column = {json.dumps(name)}, unit = {json.dumps(unit, ensure_ascii=False)}}}"
+def _table(name: str, unit: str | None, scale: float | None = None) -> str:
+    column, text = (json.dumps(value, ensure_ascii=False) for value in (name, unit))
+    scaled = "" if scale is None else f", scale = {scale:g}"
+    return f"{{column = {column}, unit = {text}{scaled}}}"
 
 
 def doubts_of(mapping: ImportMap) -> Iterator[str]:

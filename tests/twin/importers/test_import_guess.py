@@ -250,3 +250,101 @@ def test_every_column_and_value_is_in_the_map(tmp_path, ending):
         assert "# not used: note (no numbers)" in text
         assert "# not used: short (3 rows, 1 to 4)" in text
     assert import_log(path, mapping(tmp_path, text)).axes
+
+
+def lines_of(folder: Path, columns: dict[str, np.ndarray]) -> dict[str, str]:
+    """Entry -> the rest of its line, of the map proposed for these columns, which it imports."""
+    write_csv(folder / "a.csv", columns)
+    text = guess_map(folder / "a.csv").text
+    assert import_log(folder / "a.csv", mapping(folder, text)).axes
+    return dict(line.split(" = ", 1) for line in text.splitlines() if line[:1].isalpha())
+
+
+INDEX = np.arange(len(T), dtype=float)
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "line"),
+    [
+        ("Sample", "sample_rate", "1000.0 # Hz, ASSUMED: Sample counts the rows"),
+        ("t", "sample_rate", "1000.0 # Hz, ASSUMED: t counts the rows"),
+        ("t_ms", "time", '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the'),
+    ],
+)
+def test_the_number_of_a_row_is_no_time(tmp_path, name, entry, line):
+    found = lines_of(tmp_path, {name: INDEX, "pos_mm": 1e3 * Q, "force_N": F})
+    assert found[entry].startswith(line)
+    assert {"time", "sample_rate"} & found.keys() == {entry}
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "field", "line"),
+    [
+        ("qd_ref_rad", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
+        ("qd_ref", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
+        ("qd_ref", RATE_OF_GOAL, "setpoint_velocity", 'unit = "rad/s"} # so called'),
+        ("velocity [rad]", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
+    ],
+)
+def test_the_unit_and_the_data_decide_against_a_name(tmp_path, column, values, field, line):
+    found = lines_of(tmp_path, {"time_s": T, "q_rad": REACHED, column: values, "tau_Nm": PUSH})
+    assert found.keys() == {"time", "position", field, "force"}
+    assert line in found[field]
+
+
+def test_a_unit_a_second_may_be_of_two_words(tmp_path):
+    columns = {"time_s": T, "pos_mm": 1e3 * Q, "vel_mm_s": 1e3 * V, "force_N": F}
+    assert '"vel_mm_s", unit = "mm/s"} # so called' in lines_of(tmp_path, columns)["velocity"]
+
+
+def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
+    columns = {"time_s": T, "q_rad": Q, "qd": NOISE, "force_N": F}
+    write_csv(tmp_path / "a.csv", columns)
+    text = guess_map(tmp_path / "a.csv").text
+    assert "# not used: qd, as it does not go with the rate of q_rad (0." in text
+
+
+def test_a_letter_behind_a_name_need_not_be_its_unit(tmp_path):
+    found = lines_of(tmp_path, {"t": T, "theta [rad]": Q, "tau_m": F, "qd_m": V})
+    assert found["force"].startswith('{column = "tau_m"')
+    assert found["velocity"].startswith('{column = "qd_m"')
+
+
+@pytest.mark.parametrize("name", ["Strom [A]", "torque [A]"])
+def test_amperes_are_a_current(tmp_path, name):
+    found = lines_of(tmp_path, {"t": T, "pos [mm]": 1e3 * Q, name: F})
+    assert found.keys() == {"time", "position", "current"}
+    assert 'unit = "A"' in found["current"]
+
+
+def test_counts_have_an_assumed_scale_that_is_told(tmp_path):
+    columns = {"t": T, "enc_counts": 1e6 * Q, "speed [counts/s]": 1e6 * V, "u [V]": F}
+    found = lines_of(tmp_path, columns)
+    for field, scale in (("position", "1e-06"), ("velocity", "1e-06"), ("force", "1")):
+        assert f", scale = {scale}}}" in found[field]
+        assert "scale ASSUMED" in found[field]
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, guess_map(tmp_path / "a.csv").text))
+    np.testing.assert_allclose(log.axes["x"].columns["velocity"], V, atol=1e-9)
+    (what,) = assumed(log)
+    assert "position in counts with scale = 1e-06" in what
+
+
+def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):
+    columns = {"t": T, "pos_mm": 1e3 * Q, "force_N": F, "spare": 20.0 + NOISE}
+    columns = {n: c.copy() for n, c in columns.items()}
+    columns["pos_mm"][[40, 50]] = columns["spare"][3] = np.nan
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    (what,) = found.missing
+    assert what.startswith("column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all; ")
+    assert columns_of(tmp_path, found.text) == {"x": {"position": "pos_mm", "force": "force_N"}}
+
+
+def test_units_below_the_names_are_read(tmp_path):
+    write_csv(tmp_path / "a.csv", {"Time": 1e3 * T, "Position": 1e3 * Q, "Load": F})
+    names, _, rows = (tmp_path / "a.csv").read_text().partition("\n")
+    (tmp_path / "a.csv").write_text(f"{names}\nms,[mm],N\n{rows}")
+    text = guess_map(tmp_path / "a.csv").text
+    assert text.count("ASSUMED") == 1  # in the first line, of what is to be corrected
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+    np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
