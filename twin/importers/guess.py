@@ -281,8 +281,7 @@ def guess_map(path: Path) -> Guess:
             unit = "N m/A" if turns(found) else "N/A"
             lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
         taken = {signal.name for signal in found.values()}
-        unused = [n for n in names if n not in taken]
-        lines += [f"# not used: {n}, {_why_not(n, found, moving, step)}" for n in unused]
+        lines += _unused([n for n in names if n not in taken], found, moving, step)
         missing += [holes[n] for n in columns if n in holes and n in taken]
         used |= {*names, *taken}
     left = {n: c for n, c in table.columns.items() if n not in used}
@@ -304,16 +303,25 @@ def _about(name: str, raw: np.ndarray) -> str:
     return f"{name} ({len(column)} rows, {column.min():.4g} to {column.max():.4g})"
 
 
+def _unused(
+    names: Sequence[str], found: Mapping[str, Signal], columns: Columns, step: float
+) -> list[str]:
+    """Lines with the columns of an axis that are none of its signals, by what keeps them."""
+    kept: dict[str, list[str]] = {}
+    for name in names:
+        kept.setdefault(_why_not(name, found, columns, step), []).append(name)
+    return [f"# not used: {', '.join(alike)}: {why}" for why, alike in kept.items()]
+
+
 def _why_not(name: str, found: Mapping[str, Signal], columns: Columns, step: float) -> str:
-    """Why a column of an axis is none of its signals."""
     field = next(iter(named([name])), "")
     if field in found:
-        return f"as {found[field].name} is taken for the {field}"
+        return f"{found[field].name} is taken for the {field}"
     if field in ("velocity", "setpoint_velocity") and "position" in found:
         position = found["position"].name
         like = likeness_to_rate(columns[position], columns[name], step)
-        return f"as it does not go with the rate of {position} ({like:.2f})"
-    return "as neither its name nor its course tells what it is"
+        return f"correlates with the rate of {position} by {like:.2f} only"
+    return "neither name nor course tells a signal"
 
 
 def _distinct(table: Table) -> tuple[dict[str, Array], dict[str, str]]:

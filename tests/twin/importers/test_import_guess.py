@@ -136,6 +136,7 @@ def test_public_recordings(shared_data, tmp_path):
     (arts,) = (shared_data / "arts").glob("1Hz*.json")
     found = columns_of(tmp_path, guess_map(arts).text)
     assert found == {"x": {"position": "data[2]", "velocity": "data[4]", "force": "data[3]"}}
+    assert "# not used: data[5], data[6]: neither name nor" in guess_map(arts).text
     laas = guess_map(shared_data / "laas" / "acc_current.txt").text
     assert columns_of(tmp_path, laas) == {
         "x": {"position": "Position", "velocity": "Velocity", "current": "Iq"}
@@ -301,7 +302,7 @@ def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
     columns = {"time_s": T, "q_rad": Q, "qd": NOISE, "force_N": F}
     write_csv(tmp_path / "a.csv", columns)
     text = guess_map(tmp_path / "a.csv").text
-    assert "# not used: qd, as it does not go with the rate of q_rad (0." in text
+    assert "# not used: qd: correlates with the rate of q_rad by 0." in text
 
 
 def test_a_letter_behind_a_name_need_not_be_its_unit(tmp_path):
