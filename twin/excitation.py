@@ -50,6 +50,8 @@ class Excitation:
     """Periods at which the reading's error may repeat in position, m; strongest first."""
     resolution: float = 0.0
     """Step of the readings, m; 0 where none shows."""
+    reached: tuple[float, float] | None = None
+    """Lowest and highest position of the logs, m; the ends of the travel where None."""
     other_joints: tuple[float, ...] = ()
     """Numbers of a mechanism's other joints, in the order of its axes; none of a plain axis."""
 
@@ -73,3 +75,8 @@ class Excitation:
     def travel(self) -> float:
         """Distance covered, m."""
         return self.position_high - self.position_low
+
+    @property
+    def been(self) -> tuple[float, float]:
+        """Lowest and highest position that was reached, m."""
+        return self.reached or (self.position_low, self.position_high)

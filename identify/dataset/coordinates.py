@@ -83,6 +83,10 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),
+        reached=(
+            min(float(m.position.min()) for m in motions),
+            max(float(m.position.max()) for m in motions),
+        ),
         speed_max=float(np.abs(velocity).max()),
         dry_level=float(max(abs(gap) / 2.0, np.sqrt(np.finfo(float).eps) * force)),
         duration=float(sum(len(m.time) * m.period for m in motions)),

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from twin.effect import DT, MASS, MOST, OUT, Effect, Excitation, Kind, Parameter, V, X
 
-STOPS = (0.005, 0.01, 0.02, 0.035, 0.05)  # places tried, parts of the travel from its ends
+STOPS = (0.005, 0.01, 0.02, 0.035, 0.05)  # places tried, parts of what was reached, from its ends
 
 # What is less than that imitates any force of position: a stop ends a travel, and stops what moves.
 LEAST_FREE = 0.9  # part of the travel between the stops; what yields further is a cable or a spring
@@ -20,10 +20,15 @@ LEAST_PUSH = 0.25  # of the dry friction, where the travel reaches deepest
 
 def is_itself(values: Mapping[str, float], covered: Excitation) -> bool:
     """Whether stops end the travel, and push."""
-    free = values["high"] - values["low"]
-    deepest = max(covered.position_high - values["high"], values["low"] - covered.position_low)
-    push = values["stiffness"] * deepest
-    return free > LEAST_FREE * covered.travel and push > LEAST_PUSH * covered.dry_level
+    free, (low, high) = values["high"] - values["low"], covered.been
+    push = values["stiffness"] * max(high - values["high"], values["low"] - low)
+    return free > LEAST_FREE * (high - low) and push > LEAST_PUSH * covered.dry_level
+
+
+def inwards(covered: Excitation, end: int) -> tuple[float, ...]:
+    """Places to try, m, from one end of what was reached on: a travel may reach further."""
+    low, high = covered.been
+    return tuple(covered.been[end] + (1.0 - 2.0 * end) * k * (high - low) for k in STOPS)
 
 
 def law(p, s, io):
@@ -46,13 +51,13 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "low", "m", 0.0, -MOST, MOST, "lower stop",
-            start_rule=lambda e: e.position_low,
-            scan=lambda e: tuple(e.position_low + k * e.travel for k in STOPS),
+            start_rule=lambda e: e.been[0],
+            scan=lambda e: inwards(e, 0),
         ),
         Parameter(
             "high", "m", 0.0, -MOST, MOST, "upper stop",
-            start_rule=lambda e: e.position_high,
-            scan=lambda e: tuple(e.position_high - k * e.travel for k in STOPS),
+            start_rule=lambda e: e.been[1],
+            scan=lambda e: inwards(e, 1),
         ),
         Parameter("stiffness", "N/m", 0.0, 0.0, MOST, "stiffness of a stop", strength=True),
         Parameter(

@@ -136,6 +136,15 @@ def with_hum(log: Log, seed: int, times: float = 1.0) -> Log:
     return log_of(RATE, x.position, x.force + times * hum(seed))
 
 
+def test_stops_are_found_where_the_logs_end_whatever_the_travel_of_the_model() -> None:
+    true = having(SLIDE, "end_stop", low=-0.054, high=0.054, stiffness=400.0)
+    wide = replace(SLIDE, hardware=replace(HARDWARE, travel=(-0.09, 0.108)))
+    stops = few("end_stop", "asymmetric_friction", "cogging")
+    found = asked(wide, true, stops, ride=Ride(1, seconds=10.0))
+    assert found.named == ("end_stop",)
+    assert found.final.axis["end_stop"].values["low"] == pytest.approx(-0.054, abs=5e-4)
+
+
 def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     """That the noise floor rises is no change of the model: each form had unpacked its findings."""
     one, two, held = (with_hum(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
