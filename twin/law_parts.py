@@ -6,7 +6,7 @@ Compiled into each law that calls them, so they are plain functions of numbers a
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from math import copysign, cos, exp, expm1, pi, sin, sqrt
+from math import copysign, cos, exp, expm1, hypot, pi, sin, sqrt
 from typing import Any
 
 from twin.effect import (
@@ -175,6 +175,17 @@ def harmonic_terms(count: int, unit: str, most: float = MOST) -> tuple[Parameter
         for k in range(1, count + 1)
         for c, f in (("a", "sine"), ("b", "cosine"))
     )  # fmt: skip
+
+
+def of_shortest_pitch(values: Mapping[str, float]) -> dict[str, float]:
+    """Values with the shorter pitch p where only one higher harmonic of it is present."""
+    count = sum(name.startswith("a") for name in values)
+    size = {k: hypot(values[f"a{k}"], values[f"b{k}"]) for k in range(1, count + 1)}
+    highest = max(size, key=lambda k: size[k])
+    if highest == 1 or sum(size.values()) - size[highest] >= 0.1 * size[highest]:
+        return dict(values)
+    first = {"a1": values[f"a{highest}"], "b1": values[f"b{highest}"]}
+    return {**dict.fromkeys(values, 0.0), "p": values["p"] / highest, **first}
 
 
 def pitches_to_try(

@@ -240,7 +240,11 @@ def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:
 
     Strengths that ended at a bound belong to another law; it is fitted without them.
     """
-    fit = _held_inside(_less_at_bounds(fit, judged, effect), effect)
+    return in_simplest_values(_held_inside(_less_at_bounds(fit, judged, effect), effect), effect)
+
+
+def in_simplest_values(fit: Fit, effect: Effect) -> Fit:
+    """The fit with the simplest values of an effect, where they explain as much."""
     if effect.simplest is None:
         return fit
     fitted = fit.axis[effect.name]

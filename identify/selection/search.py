@@ -22,7 +22,15 @@ from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, prefers, score
 from identify.selection.candidates import Candidate, candidate_of, ordered
-from identify.selection.changes import Added, Change, Look, Reshaped, control, freed_of
+from identify.selection.changes import (
+    Added,
+    Change,
+    Look,
+    Reshaped,
+    control,
+    freed_of,
+    in_simplest_values,
+)
 from identify.selection.controls import Trial
 from identify.selection.trying import (
     LEADERS,
@@ -157,6 +165,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         _forget(t.judged.fit for t in last if all(t is not s.tried for s in new))
         step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
+        judged = _in_simplest_values(judged, steps)
         passed[-1] = steps[-1]  # which tells what it made needless
         judged, freed = _with_free_exponents(judged, steps)
         passed, steps = [*passed, *freed], (*steps, *freed)
@@ -182,6 +191,16 @@ def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> 
     tried = tried_beside(plain, catalogue, within(progress, "no channel delay"))[1]
     found = [t for t in tried if t.candidate.supported and not t.judged.dataset.channel_delay]
     return plain if any(score(judged, t.judged).accepted for t in found) else judged
+
+
+def _in_simplest_values(judged: Judged, steps: tuple[Step, ...]) -> Judged:
+    """The fit with the simplest values of what was added, which later steps may have cleared."""
+    fit = judged.fit
+    for change in (s.change for s in steps if isinstance(s.change, Added)):
+        fit = in_simplest_values(fit, fit.axis[change.name].effect)
+    if fit is judged.fit:
+        return judged
+    return Judged(replace(fit, begun=judged.fit.begun), judged.dataset)
 
 
 def _with_free_exponents(

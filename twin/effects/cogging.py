@@ -5,12 +5,15 @@ J. F. Gieras, Z. J. Piech, B. Tomczuk, "Linear Synchronous Motors", 2nd ed. (201
 force is a Fourier series in position with period set by pole pitch and slot pitch.
 """
 
-from collections.abc import Mapping
-from math import hypot
-
 from twin.curve import Coordinate, Curve
 from twin.effect import LEAST, MOST, OUT, Effect, Kind, Parameter, X
-from twin.law_parts import columns_of, harmonic_terms, harmonics, pitches_to_try
+from twin.law_parts import (
+    columns_of,
+    harmonic_terms,
+    harmonics,
+    of_shortest_pitch,
+    pitches_to_try,
+)
 
 CYCLES = 120  # most over the travel that are tried before a model tells them
 
@@ -22,17 +25,6 @@ def law(p, s, io):
 
 def columns(p, s, io):
     columns_of(io, harmonics(io[X], p[0]))
-
-
-def simplest(values: Mapping[str, float]) -> dict[str, float]:
-    """The shorter pitch where only one higher harmonic of the pitch is present."""
-    size = {k: hypot(values[f"a{k}"], values[f"b{k}"]) for k in (1, 2, 3)}
-    for k in (2, 3):
-        others = sum(size[j] for j in (1, 2, 3) if j != k)
-        if others < 0.1 * size[k]:
-            zero = {f"{c}{j}": 0.0 for c in "ab" for j in (2, 3)}
-            return {"p": values["p"] / k, "a1": values[f"a{k}"], "b1": values[f"b{k}"], **zero}
-    return dict(values)
 
 
 EFFECT = Effect(
@@ -49,7 +41,7 @@ EFFECT = Effect(
     ),
     law=law,
     columns=columns,
-    simplest=simplest,
+    simplest=of_shortest_pitch,
     curves=(Curve(Coordinate.POSITION, period="p"),),
     several=True,
     fingerprint="residual repeats along the track, the same in both directions and at every force",

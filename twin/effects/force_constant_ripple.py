@@ -7,7 +7,7 @@ magnet motors", Proc. American Control Conference 2001.
 """
 
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U, X
-from twin.law_parts import harmonic_terms, harmonics, pitches_to_try
+from twin.law_parts import harmonic_terms, harmonics, of_shortest_pitch, pitches_to_try
 
 CYCLES = 70  # most over the travel that are tried before a model tells them
 
@@ -31,6 +31,7 @@ EFFECT = Effect(
         *harmonic_terms(2, "1", 0.5),
     ),
     law=law,
+    simplest=of_shortest_pitch,
     several=True,
     fingerprint="residual repeats along the track in proportion to the motor force there",
     excited_by="strong accelerations both ways at many places, over many magnet pitches",

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from effect_runs import CATALOGUE, LOG
 
-from twin.effect import IO_SIZE, OUT, Effect, Excitation, X
+from twin.effect import IO_SIZE, OUT, Effect, Excitation, U, X
 from twin.excitation import Repeating
 from twin.model.units import dimension
 
@@ -152,18 +152,25 @@ def test_lines_of_the_log_are_tried_and_a_ladder_where_there_are_none() -> None:
 
 def force(effect: Effect, values: dict[str, float], x: float) -> float:
     io = [0.0] * IO_SIZE
-    io[X] = x
+    io[X], io[U] = x, 1.0
     effect.law([values[p.name] for p in effect.parameters], [], io)
-    return io[OUT]
+    return io[OUT] + io[U]
 
 
-@pytest.mark.parametrize(("k", "others"), [(1, 0.0), (2, 0.09), (2, 0.11), (3, 0.0)])
-def test_the_simplest_pitch_has_the_same_force(k: int, others: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "k", "others"),
+    [
+        ("cogging", 1, 0.0), ("cogging", 2, 0.09), ("cogging", 2, 0.11), ("cogging", 3, 0.0),
+        ("force_constant_ripple", 2, 0.09),
+    ],
+)  # fmt: skip
+def test_the_simplest_pitch_has_the_same_force(name: str, k: int, others: float) -> None:
     """A harmonic alone is a fundamental of a part of the pitch; less than a tenth is left out."""
-    effect = CATALOGUE["cogging"]
-    values = {"p": 0.03, **{f"{c}{j}": 0.0 for c in "ab" for j in (1, 2, 3)}}
+    effect = CATALOGUE[name]
+    every = {int(p.name[1:]) for p in effect.strengths}
+    values = {"p": 0.03, **{f"{c}{j}": 0.0 for c in "ab" for j in every}}
     values[f"a{k}"], values[f"b{k}"] = 0.6, -0.8
-    for j in {1, 2, 3} - {k}:
+    for j in every - {k}:
         values[f"b{j}"] = 0.5 * others
     simple = effect.simplest(values)
     assert set(simple) == set(values)
