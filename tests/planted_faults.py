@@ -129,7 +129,7 @@ def force_samples(c: Columns) -> None:
 
 
 def noisy_force(c: Columns) -> None:
-    noise = np.random.default_rng(3).standard_normal(len(c["force"]))
+    noise = 7.0 * np.random.default_rng(3).standard_normal(len(c["force"]))
     c["force"] += noise
     c["current"] += noise / CONSTANT
 
@@ -163,11 +163,11 @@ FAULTS: dict[str, tuple[Plant, Fault]] = {
     "a sample of the position": (on_x(one_sample), Fault.OUTLIERS),
     "joined logs": (joined, Fault.JOINED),
     "lost counts": (on_x(lost_counts), Fault.STEP),
-    "force 3 samples late": (late(3, *DRIVEN), Fault.LAG),
+    "force 5 samples late": (late(5, *DRIVEN), Fault.LAG),
     "force 20 samples late": (late(20, *DRIVEN), Fault.LAG),
     "force 500 samples late": (late(500, *DRIVEN), Fault.LAG),
     "force 20 samples early": (late(-20, *DRIVEN), Fault.LAG),
-    "position 3 samples late": (late(3, "position"), Fault.LAG),
+    "position 5 samples late": (late(5, "position"), Fault.LAG),
     "position 20 samples late": (late(20, "position"), Fault.LAG),
     "readings 500 samples late": (late(500, "position", "velocity", *DRIVEN), Fault.LAG),
     "200 ppm between clocks": (on_x(drifting), Fault.DRIFT),
@@ -176,7 +176,7 @@ FAULTS: dict[str, tuple[Plant, Fault]] = {
     "samples of the force": (on_x(force_samples), Fault.OUTLIERS),
     "force held 2 samples": (held(2, *DRIVEN), Fault.HELD),
     "20 um rounding": (on_x(rounded), Fault.COARSE_POSITION),
-    "1 N noise": (on_x(noisy_force), Fault.NOISE),
+    "7 N noise": (on_x(noisy_force), Fault.NOISE),
     "millimetres": (on_x(in_millimetres), Fault.UNIT),
     "a reversed force": (on_x(reversed_force), Fault.SIGN),
     "a limited force": (on_x(limited), Fault.SATURATION),

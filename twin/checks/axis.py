@@ -139,25 +139,42 @@ class Axis:
         return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
 
     @cached_property
+    def going(self) -> Array:
+        """(m,) 1.0 where the axis keeps moving one way and its motion is believed, else 0.0.
+
+        It stops gently and breaks loose at once, which looks like a force ahead of its motion.
+        """
+        return self.kept * (np.abs(self.regressors[:, 2]) > limits.FULL_FRICTION)
+
+    @cached_property
     def lag(self) -> float:
         """Lag of the command behind the motion that it causes, s; 0 where none is clear.
 
         Nor where friction with a memory explains it: what lags by a distance and not by a time is
-        none.
+        none. How long it is, is told away from standstill.
         """
         found = self.lag_of(self.force, self.regressors)
         beside = self.lag_of(self.force, self.remembering) if found else 0.0
-        same = abs(beside - found) < limits.SAME_LAG * abs(found)
-        return found if beside and same else 0.0
+        if not beside or abs(beside - found) >= limits.SAME_LAG * abs(found):
+            return 0.0
+        going, _ = find_lag(self.force, self.regressors, self.going, self.smoother.block)
+        told = self.going.mean() > limits.KEPT_PART
+        return going if told and abs(going - found) < limits.PHYSICAL else found
 
     def lag_of(self, signal: Array, explained_by: Array) -> float:
         """Lag (s) of a signal (m,) behind its regressors (m, k); 0 where that is not clear."""
         seconds, clear = find_lag(signal, explained_by, self.kept, self.smoother.block)
         return seconds if clear else 0.0
 
-    def trend(self, regressors: Array) -> Trend | None:
-        """The same in each part of the log, beside some regressors of the command."""
-        return find_trend(self.force, regressors, self.kept, self.smoother.block)
+    @property
+    def trend(self) -> Trend | None:
+        """The same in each part of the log, beside friction with a memory."""
+        return find_trend(self.force, self.remembering, self.going, self.smoother.block)
+
+    @property
+    def rare(self) -> float:
+        """Part of the log that a burst may be: a hundredth, more in one so short that one is."""
+        return max(0.01, 3.0 * self.smoother.length / self.duration)
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -165,7 +182,7 @@ class Axis:
         shift = round(self.lag / self.smoother.block)
         span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
         force = self.force[span.start + shift : span.stop + shift]
-        return fit_dynamics(force, self.regressors[span], self.kept[span], span.start)
+        return fit_dynamics(force, self.regressors[span], self.kept[span], span.start, self.rare)
 
     def span(self, rows: slice) -> Array:
         """Orthonormal basis (r, k) of what its motion can explain, at some of the samples."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from twin.checks import limits
 from twin.checks.axis import Axis
+from twin.checks.explain import contradicted
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
@@ -84,7 +85,9 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
             opposed = abs(last.step + b.step) < limits.ALIKE_SPEEDS * abs(b.step)
             if opposed or {last.fault, b.fault} <= {Fault.OUTLIERS, Fault.UNEVEN}:
                 size = max(abs(last.size), abs(b.step or b.size))
-                out[-1] = Break(Fault.OUTLIERS, last.first, b.last, size)
+                skips = last.fault is b.fault is Fault.UNEVEN
+                fault = Fault.UNEVEN if skips else Fault.OUTLIERS
+                out[-1] = Break(fault, last.first, b.last, size)
                 continue
         out.append(b)
     return out
@@ -224,7 +227,7 @@ def _rough_command(axis: Axis) -> Array:
     rough = second > limits.ROUGH * axis.force_size
     span = max(round(limits.ROUGH_SPAN * axis.sample_rate), 2 * limits.FEWEST_ROUGH)
     if np.count_nonzero(rough) >= span // 2:
-        rough &= second > limits.UNUSUAL * _usual(axis, second)
+        rough &= second > limits.UNUSUAL * float(np.quantile(second, 1.0 - axis.rare))
     if np.count_nonzero(rough) < span // 2:
         return np.empty(0)
     dense = np.convolve(rough, np.ones(span), "same") > span // 2
@@ -237,21 +240,14 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
     if not fit.explains:
         return
     error = np.abs(fit.residual) * axis.kept[fit.first : fit.first + len(fit.residual)]
-    command = np.quantile(np.abs(axis.force - np.median(axis.force)), 0.99)
-    usual, unit = _usual(axis, error), axis.log.units["force"]
-    bad = np.flatnonzero(error > max(limits.UNUSUAL * usual, limits.CONTRADICTION * command))
+    bad = np.flatnonzero(error > contradicted(error, axis.force, axis.rare))
     if len(bad):
+        usual, unit = float(np.quantile(error, 1.0 - axis.rare)), axis.log.units["force"]
         what = (
             f"force and motion contradict each other by up to {error.max():.3g} {unit}, "
             f"elsewhere by less than {usual:.2g} {unit}"
         )
         yield _outliers(axis, axis.smoother.time(bad + fit.first), what)
-
-
-def _usual(axis: Axis, values: Array) -> float:
-    """What 99 % of the values stay below; fewer in a log so short that a burst is more than 1 %."""
-    burst = 3.0 * axis.smoother.length / axis.duration
-    return float(np.quantile(values, 1.0 - max(0.01, burst)))
 
 
 def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> Finding:

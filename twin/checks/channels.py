@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.checks import limits
 from twin.checks.axis import READINGS, Axis
-from twin.checks.explain import Trend, fit_dynamics
+from twin.checks.explain import fit_dynamics
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
@@ -50,10 +50,12 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
 
 def _steady(axis: Axis) -> Iterator[Finding]:
     """A lag or a drift too small to be seen at once, but the same in all parts of the log."""
-    trend = axis.trend(axis.regressors)
+    trend = axis.trend
     if trend is None or not axis.dynamics.explains:
         return
-    if abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error):
+    without, steady, drifting = trend.left
+    sure = abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error)
+    if sure and _taken_off(axis, steady, drifting) > limits.TAKEN_BY_DRIFT:
         yield axis.warning(
             Fault.DRIFT,
             f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
@@ -62,18 +64,22 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "record both with one clock, or import each with time stamps",
         )
         return
-    if _is_steady(axis, trend) and _is_steady(axis, axis.trend(axis.remembering)):
+    least = max(limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY)
+    sure = max(least, limits.SURE_LAG * trend.error) < abs(trend.seconds) < limits.PHYSICAL
+    if sure and _taken_off(axis, without, steady) > limits.TAKEN_BY_LAG:
         what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
         told = f"{what}, +- {trend.error * 1e3:.2g} ms"
         yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)
 
 
-def _is_steady(axis: Axis, trend: Trend | None) -> bool:
-    """Whether a lag is more than its error and than what is usual, and may be a drive's."""
-    if trend is None:
-        return False
-    least = max(limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY)
-    return max(least, limits.SURE_LAG * trend.error) < abs(trend.seconds) < limits.PHYSICAL
+def _taken_off(axis: Axis, before: float, after: float) -> float:
+    """How many times as much (N rms) a lag takes off as it leaves beside the noise.
+
+    What another effect leaves, as a ripple or backlash, is in part explained by a lag too.
+    """
+    noise = axis.smoother.held_noise(axis.force_noise)
+    rest = max(after**2 - noise**2, np.finfo(float).tiny)
+    return float((max(before**2 - after**2, 0.0) / rest) ** 0.5)
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:
@@ -221,7 +227,7 @@ def _explained_by(one: Axis, axes: Sequence[Axis]) -> Axis | None:
 def _left(force: Axis, motion: Axis) -> float:
     """The part of a force that a motion does not explain."""
     kept = np.minimum(force.kept, motion.kept)
-    fit = fit_dynamics(force.force, motion.regressors, kept, 0)
+    fit = fit_dynamics(force.force, motion.regressors, kept, 0, motion.rare)
     return float(np.median(np.abs(fit.residual)) / np.median(np.abs(_centred(force.force))))
 
 

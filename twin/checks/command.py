@@ -33,7 +33,7 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
     left = float(np.median(np.abs(axis.dynamics.residual)))
     hides = axis.dynamics.explains and averaged >= limits.HIDES * left
-    if hides and noise > limits.NOISY * float(np.std(force)):
+    if hides and averaged > limits.NOISY * float(np.std(force)):
         yield axis.warning(
             Fault.NOISE,
             f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "

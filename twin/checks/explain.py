@@ -117,23 +117,43 @@ class Dynamics:
         return self.inertial_share > limits.NOTICED
 
 
-def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int) -> Dynamics:
-    """Least trimmed squares of a force (m,) on regressors (m, k), the first the acceleration."""
-    acceleration = np.abs(regressors[:, 0])
-    use = (kept > 0.0) & (acceleration <= limits.LEVERAGE * np.quantile(acceleration, 0.99))
+def contradicted(error: Array, force: Array, rare: float) -> float:
+    """What an error (n,) N of a force (n,) must exceed to be unusual, which a rare part may be."""
+    size = float(np.quantile(np.abs(force - np.median(force)), 0.99))
+    usual = float(np.quantile(error, 1.0 - rare))
+    return max(limits.UNUSUAL * usual, limits.CONTRADICTION * size)
+
+
+def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int, rare: float) -> Dynamics:
+    """Least squares of a force (m,) on regressors (m, k), the first the acceleration.
+
+    Where samples contradict the others, the worst are left out, and no others: in a log of constant
+    speeds a few samples hold all the acceleration there is. rare: part of the log that they may be.
+    """
+    use = kept > 0.0
     size = np.sqrt(np.mean(regressors**2, axis=0))
     scaled = regressors / np.where(size > 0.0, size, 1.0)
-    for _ in range(limits.ROUNDS):
-        rows = scaled * use[:, None]
-        gains = np.linalg.lstsq(rows.T @ scaled, rows.T @ force, rcond=1e-12)[0]
-        residual = force - scaled @ gains
-        error = np.abs(residual)
-        use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - limits.TRIMMED))
+    gains, residual = _squares(force, scaled, use)
+    error = np.abs(residual[use])
+    if error.max(initial=0.0) > contradicted(error, force[use], rare):
+        acceleration = np.abs(regressors[:, 0])
+        use &= acceleration <= limits.LEVERAGE * np.quantile(acceleration, 0.99)
+        for _ in range(limits.ROUNDS):
+            gains, residual = _squares(force, scaled, use)
+            error = np.abs(residual)
+            use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - limits.TRIMMED))
     spread = float(np.std(force[use]))
     explains = float(np.std(residual[use])) < limits.EXPLAINED * spread
     mass = float(gains[0] / size[0]) if size[0] > 0.0 else 0.0
     share = float(np.std(gains[0] * scaled[use, 0])) / spread if spread > 0.0 else 0.0
     return Dynamics(mass, explains, share, residual, first)
+
+
+def _squares(force: Array, columns: Array, use: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Gains (k,) of columns (m, k) in the samples of a force (m,) in use, and all that is left."""
+    rows = columns * use[:, None]
+    gains = np.asarray(np.linalg.lstsq(rows.T @ columns, rows.T @ force, rcond=1e-12)[0], float)
+    return gains, force - columns @ gains
 
 
 def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> tuple[float, bool]:
@@ -142,6 +162,20 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> t
     It is where another fits much worse. kept: (n,) 1.0 where the regressors may be believed, else
     0.0; block: s from sample to sample.
     """
+    total, left = _left_at(signal, explained_by, kept, block)
+    samples, reach = _least_lag(total, left), len(left) // 2
+    best = reach + round(samples)
+    clear = (
+        left[best] < limits.CLEAR_LAG**2 * total[best]
+        and left[reach] > limits.WRONG_LAG**2 * total[reach]
+        and left[best] < limits.BETTER_LAG**2 * left[reach]
+        and abs(samples) <= limits.OF_A_PERIOD * _period(signal - signal.mean())
+    )
+    return samples * block, bool(clear)
+
+
+def _left_at(signal: Array, explained_by: Array, kept: Array, block: float) -> tuple[Array, Array]:
+    """Power (2 r + 1,) of a signal at each lag from -r to r blocks, and what is left of it."""
     reach = min(round(limits.LONGEST_LAG / block), len(signal) // limits.MOTION_OVER_LAG)
     inner = slice(reach, len(signal) - reach)
     columns = explained_by[inner] * kept[inner, None]
@@ -151,22 +185,19 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> t
     centred = signal - signal.mean()
     total = sliding_products(centred**2, kept[inner])
     products = sliding_products(centred, columns.T)
-    residual = np.maximum(total - np.einsum("ij,ij->j", products, inverse @ products), 0.0)
-    dips, fraction, bottom = _dips(residual)
-    least = min(bottom.min(initial=np.inf), residual.min())  # the latter where it falls to an end
+    return total, np.maximum(total - np.einsum("ij,ij->j", products, inverse @ products), 0.0)
+
+
+def _least_lag(total: Array, left: Array) -> float:
+    """The least lag, in blocks, at which as little is left as anywhere; 0 where there is none."""
+    dips, fraction, bottom = _dips(left)
+    least = min(bottom.min(initial=np.inf), left.min())  # the latter where it falls to an end
     good = (bottom <= limits.AS_GOOD_LAG**2 * least) | (bottom <= limits.WRONG_LAG**2 * total[dips])
     if not good.any():
-        return 0.0, False
-    nearest = int(np.argmin(np.abs(dips[good] - reach)))  # a periodic motion has several
-    best = int(dips[good][nearest])
-    samples = float(best - reach + fraction[good][nearest])
-    clear = (
-        residual[best] < limits.CLEAR_LAG**2 * total[best]
-        and residual[reach] > limits.WRONG_LAG**2 * total[reach]
-        and residual[best] < limits.BETTER_LAG**2 * residual[reach]
-        and abs(samples) <= limits.OF_A_PERIOD * _period(centred)
-    )
-    return samples * block, bool(clear)
+        return 0.0
+    lags = dips[good] - len(left) // 2
+    nearest = int(np.argmin(np.abs(lags)))  # a periodic motion has several
+    return float(lags[nearest] + fraction[good][nearest])
 
 
 def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
@@ -180,34 +211,56 @@ def _dips(residual: Array) -> tuple[NDArray[np.intp], Array, Array]:
 
 @dataclass(frozen=True)
 class Trend:
-    """Lag in s over a log: its middle and how well that is known, its drift in s/s, likewise."""
+    """Lag in s over a log: its middle and how well that is known, its drift in s/s, likewise.
+
+    left: N rms that the motion leaves of the command at no lag, at the middle one, and at one that
+    drifts.
+    """
 
     seconds: float
     error: float
     drift: float
     drift_error: float
+    left: tuple[float, float, float]
 
 
 def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) -> Trend | None:
     """The lag in each part of a log; None where too few parts tell one."""
     edges = np.linspace(0, len(signal), limits.LAG_PARTS + 1).astype(int)
-    found = []
-    for first, last in pairwise(edges):
-        part = slice(first, last)
-        if kept[part].mean() > 0.5 and np.ptp(signal[part]) > limits.LIVELY_PART * np.ptp(signal):
-            lag, _ = find_lag(signal[part], explained_by[part], kept[part], block)
-            found.append((0.5 * (first + last) * block, lag))
-    if len(found) < limits.FEWEST_LAG_PARTS:
+    lively = limits.LIVELY_PART * np.ptp(signal)
+    every = [slice(first, last) for first, last in pairwise(edges)]
+    parts = [p for p in every if kept[p].mean() > limits.KEPT_PART and np.ptp(signal[p]) > lively]
+    if len(parts) < limits.FEWEST_LAG_PARTS:
         return None
-    times, lags = np.array(found).T
+    curves = [_left_at(signal[p], explained_by[p], kept[p], block) for p in parts]
+    lags = block * np.array([_least_lag(total, left) for total, left in curves])
+    times = np.array([0.5 * (p.start + p.stop) * block for p in parts])
     times = times - times.mean()
     middle = float(np.median(lags))
     spread = 1.4826 * float(np.median(np.abs(lags - middle)))
     pairs = combinations(range(len(lags)), 2)
     drift = float(np.median([(lags[j] - lags[i]) / (times[j] - times[i]) for i, j in pairs]))
-    left = 1.4826 * float(np.median(np.abs(lags - middle - drift * times)))
-    length = float(np.linalg.norm(times))
-    return Trend(middle, 1.25 * spread / len(lags) ** 0.5, drift, 1.25 * left / length)
+    apart = 1.4826 * float(np.median(np.abs(lags - middle - drift * times)))
+    reach = len(curves[0][1]) // 2
+    count = sum(np.count_nonzero(kept[p][reach : len(kept[p]) - reach]) for p in parts)
+
+    def left(of_each: Array) -> float:
+        power = sum(_between(curves[i][1], lag) for i, lag in enumerate(of_each / block))
+        return float((power / max(count, 1)) ** 0.5)
+
+    none, steady = np.zeros(len(times)), np.full(len(times), middle)
+    remain = (left(none), left(steady), left(steady + drift * times))
+    error = 1.25 * spread / len(lags) ** 0.5
+    return Trend(middle, error, drift, 1.25 * apart / float(np.linalg.norm(times)), remain)
+
+
+def _between(curve: Array, lag: float) -> float:
+    """A curve over the lags (2 r + 1,), by the parabola about the sample next to a lag."""
+    place = lag + len(curve) // 2
+    at = min(max(round(place), 1), len(curve) - 2)
+    part, below, above = place - at, curve[at - 1], curve[at + 1]
+    bend = above - 2.0 * curve[at] + below
+    return max(float(curve[at] + 0.5 * part * (above - below + part * bend)), 0.0)
 
 
 def _period(signal: Array) -> float:

@@ -25,6 +25,7 @@ FEWEST_COUNTS = 5  # that tell one
 ONE_COUNT = (0.5, 0.25, 0.1)  # parts of the ways that may be less, as text far from 0 is coarser
 WHOLE_WAY = 0.05  # of a count: how far a way may be off a whole one
 OF_WHOLE_WAYS = 0.9  # least part of the ways that are whole ones
+FULL_FRICTION = 0.95  # of Coulomb friction: a low-pass with less of it holds a standstill
 SAME_LAG = 0.3  # largest difference of a lag with and without a memory, as a part of it
 PRESLIDING = (0.003, 0.01, 0.03, 0.1, 0.3)  # of the way covered, over which friction may build up
 FALLS_SHORT = 0.8  # of the setpoint's spread, up to which a position falls short of it
@@ -47,6 +48,7 @@ WRONG_LAG = 0.03  # least residual without a lag, as a part of the signal
 BETTER_LAG = 0.6  # largest residual at the best lag, as a part of that without a lag
 LAG_PARTS = 8  # of a log, each with a lag of its own
 FEWEST_LAG_PARTS = 5  # lively ones, of which a median is worth the name
+KEPT_PART = 0.2  # of a part, that moves for it to tell a lag; of moves with pauses half is rest
 LIVELY_PART = 0.04  # least range of a part, of that of the whole
 REPEATS = 0.7  # least correlation of a signal with itself a period later
 OF_A_PERIOD = 0.125  # lags beyond that part of a period are told from none by the harmonics alone
@@ -75,7 +77,7 @@ FEWEST_ROUGH = 5  # samples, where so long is fewer
 
 # The command
 
-NOISY = 0.05  # noise of the command, as a part of it
+NOISY = 0.03  # averaged noise of the command, as a part of it; 1 % of its rating leaves 0.02
 HIDES = 0.4  # averaged noise, as a part of what the motion leaves unexplained
 SINGLE_SAMPLE = 60.0  # times what 99 % of the samples are off their neighbours
 LARGE_SAMPLE = 0.3  # of the command
@@ -98,6 +100,9 @@ PHYSICAL = 10e-3  # s, what a slow drive may account for
 STEADY = 0.25e-3  # s, what friction that the check does not know may account for
 STEADY_SAMPLES = 1.5  # at least, where so long is fewer
 SURE_LAG = 5.0  # times its error, that a lag or a drift must be
+# What they take off, as a multiple of what is left beside the noise
+TAKEN_BY_LAG = 2.0  # ripple, backlash and vibration are answered by a loop: a lag takes off 1.7
+TAKEN_BY_DRIFT = 1.0  # of the same a drift takes off 0.2
 DRIFT = 60e-6  # s/s; two quartz clocks differ by less
 FOLLOWING = 30e-3  # s, what a slow position loop may account for
 LONGEST_TRAVEL = 10.0  # m; farther, the unit is wrong

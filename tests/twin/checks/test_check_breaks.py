@@ -124,6 +124,14 @@ def test_a_clock_that_skips_is_less_than_two_samples_motion(part, fault, words, 
     assert stated(found, words) == pytest.approx(size, rel=0.05)
 
 
+def test_a_clock_that_skips_twice_is_still_no_outlier():
+    def change(columns):
+        columns["position"][[FAST - 10, FAST + 10]] += 0.7 * SPEED / RATE
+
+    (found,) = broken(change)
+    assert (found.fault, found.severity) == (Fault.UNEVEN, Severity.WARNING)
+
+
 @pytest.mark.parametrize(
     ("count", "seconds", "uneven"), [(11, 4.0, False), (13, 8.0, True), (20, 30.0, False)]
 )

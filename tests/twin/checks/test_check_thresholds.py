@@ -168,7 +168,7 @@ COARSE = (
 )  # m rms, of which the acceleration has noise of three tenths
 SLOWEST = SOUND.smoother.velocity_noise(1e-6)
 SINGLE = axis_of(drive(coulomb=0.0)).force_size
-SPREAD = float(np.std(SOUND.log.force))
+NOISY = float(np.std(SOUND.log.force)) / SOUND.smoother.held_noise(1.0)  # N, from which it is all
 BURST = np.random.default_rng(2).standard_normal(30)
 FRO = 0.25 * (-1.0) ** np.arange(20)  # its second difference is four times as large
 ERROR = Severity.ERROR
@@ -191,8 +191,8 @@ CASES = {
                            0.35 * SINGLE, Fault.OUTLIERS,
                            "single samples of the force are off by up to ", 0.35 * SINGLE,
                            "1.2 s and 1 more times", ERROR),
-    "noise": Case(added("force", slice(None), WHITE[:4000]), [0.04 * SPREAD], 0.06 * SPREAD,
-                  Fault.NOISE, "the force has noise of ", 0.06 * SPREAD, "whole log"),
+    "noise": Case(added("force", slice(None), WHITE[:4000]), [0.024 * NOISY], 0.036 * NOISY,
+                  Fault.NOISE, "the force has noise of ", 0.036 * NOISY, "whole log"),
     "steps": Case(added("position", slice(2500, None), signals=BOTH),
                   [0.9 * (SOUND.possible_jump - BEND)], 8.0 * (SOUND.possible_jump + BEND),
                   Fault.STEP, "the position steps by ", 8.0 * (SOUND.possible_jump + BEND),

@@ -3,6 +3,7 @@
 Beside each of these machines the fault that it looks like is still found.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from check_cases import clean_log, faults, stage
+from check_cases import clean_log, faults, milliseconds, stage
 
 from twin.checks import Fault, check_log
 from twin.experiments.named import simulate
@@ -151,6 +152,65 @@ def test_friction_with_a_memory_is_no_lag_and_hides_none(motion, gain, late):
     columns = {"position": reading[100:], "force": np.roll(torque, late)[100:]}
     found = faults(check_log(Log(RATE, {"x": AxisLog(columns, ROTARY_UNITS)})))
     assert (Fault.LAG in found) == (late != 0)
+
+
+CART, DRY, LOOP = 8.0, 5.0, 100.0  # kg, N, rad/s
+
+
+def sticking(goal: Array, ripple: float, noise: float = 0.2) -> tuple[Array, Array]:
+    """Position (n,) m and force (n,) N of a cart with dry friction under a PID loop.
+
+    ripple: N, of a force that repeats every 5 mm.
+    """
+    dt = 1.0 / RATE / FINER
+    rates = np.gradient(goal) * RATE
+    x, v, total = float(goal[0]), 0.0, 0.0
+    reading, force = np.empty(len(goal)), np.empty(len(goal))
+    for k, (wanted, rate) in enumerate(zip(goal.tolist(), rates.tolist(), strict=True)):
+        reading[k] = 1e-6 * round(x / 1e-6)
+        total += (wanted - reading[k]) / RATE
+        springs = LOOP**2 * (wanted - reading[k] + LOOP / 8.0 * total)
+        force[k] = u = CART * (springs + 1.6 * LOOP * (rate - v))
+        for _ in range(FINER):
+            free = v + dt / CART * (u - 30.0 * v - ripple * math.sin(x / 8e-4))
+            v = math.copysign(max(abs(free) - dt / CART * DRY, 0.0), free)
+            x += v * dt
+    return reading, force + noise * np.random.default_rng(1).standard_normal(len(goal))
+
+
+def three_waves(*rates: float, slower: float = 0.0) -> Array:
+    """(n,) m of these frequencies (Hz), which fall by 2 ``slower`` a second."""
+    t = np.arange(10_000) / RATE
+    t *= 1.0 - slower * t
+    return np.sum([0.03 / f * np.sin(2.0 * np.pi * f * t + 3.0 * f) for f in rates], axis=0)
+
+
+@pytest.mark.parametrize(("late", "ripple"), [(0, 0.0), (3, 0.0), (-3, 0.0), (0, 1.0), (0, 5.0)])
+def test_what_stops_gently_and_breaks_loose_at_once_is_no_lag_and_hides_none(late, ripple):
+    """Nor is a ripple that the loop answers."""
+    reading, force = sticking(three_waves(0.3, 0.9, 2.1), ripple)
+    columns = {"position": reading[10:-10], "force": np.roll(force, late)[10:-10]}
+    found = check_log(Log(RATE, {"x": AxisLog(columns)})).findings
+    assert [f.fault for f in found] == [Fault.LAG] * (late != 0)
+    assert [milliseconds(f) for f in found] == pytest.approx([late] * (late != 0), abs=0.2)
+
+
+def test_what_the_loop_answers_later_as_it_slows_is_no_other_clock() -> None:
+    reading, force = sticking(three_waves(0.2, 0.5, 1.3, slower=0.04), 2.0)
+    assert not faults(check_log(Log(RATE, {"x": AxisLog({"position": reading, "force": force})})))
+
+
+def test_constant_speeds_contradict_no_acceleration_that_is_rare() -> None:
+    """Seven in a thousand samples accelerate: to leave out the worst is to leave out them all."""
+    t = np.arange(0.0, 40.0, 1.0 / RATE)
+    legs = np.array([0.0, 0.1, -0.15, 0.2, -0.25, 0.3, -0.3, 0.15, -0.1, 0.0])
+    begun = 4.2 * np.arange(len(legs))
+    plan = np.interp(t, np.ravel([begun, begun + 4.17], "F"), np.repeat(legs, 2))
+    position = 1e-5 * np.round(np.cumsum(plan) / RATE / 1e-5)
+    force = CART * np.gradient(plan) * RATE + DRY * np.sign(plan) + 20.0 * plan
+    force += 0.1 * np.random.default_rng(1).standard_normal(len(t))
+    found = check_log(Log(RATE, {"x": AxisLog({"position": position, "force": force})}))
+    assert not faults(found) & {Fault.OUTLIERS, Fault.WEAK_EXCITATION}
 
 
 def steps_and_rests(seconds: float = 16.0) -> Array:
