@@ -195,8 +195,11 @@ def test_what_stops_gently_and_breaks_loose_at_once_is_no_lag_and_hides_none(lat
     assert [milliseconds(f) for f in found] == pytest.approx([late] * (late != 0), abs=0.2)
 
 
-def test_what_the_loop_answers_later_as_it_slows_is_no_other_clock() -> None:
-    reading, force = sticking(three_waves(0.2, 0.5, 1.3, slower=0.04), 2.0)
+@pytest.mark.parametrize(
+    ("rates", "slower", "ripple"), [((0.2, 0.5, 1.3), 0.04, 2.0), ((0.3, 0.9, 2.1), 0.02, 1.0)]
+)
+def test_what_the_loop_answers_later_as_it_slows_is_no_other_clock(rates, slower, ripple):
+    reading, force = sticking(three_waves(*rates, slower=slower), ripple)
     assert not faults(check_log(Log(RATE, {"x": AxisLog({"position": reading, "force": force})})))
 
 
