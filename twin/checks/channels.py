@@ -55,7 +55,7 @@ def _steady(axis: Axis) -> Iterator[Finding]:
         return
     without, steady, drifting = trend.left
     sure = abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error)
-    if sure and _taken_off(axis, steady, drifting) > limits.TAKEN_BY_DRIFT:
+    if sure and _takes_off(axis, steady, drifting, limits.TAKEN_BY_DRIFT):
         yield axis.warning(
             Fault.DRIFT,
             f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
@@ -66,20 +66,19 @@ def _steady(axis: Axis) -> Iterator[Finding]:
         return
     least = max(limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY)
     sure = max(least, limits.SURE_LAG * trend.error) < abs(trend.seconds) < limits.PHYSICAL
-    if sure and _taken_off(axis, without, steady) > limits.TAKEN_BY_LAG:
+    if sure and _takes_off(axis, without, steady, limits.TAKEN_BY_LAG):
         what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
         told = f"{what}, +- {trend.error * 1e3:.2g} ms"
         yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)
 
 
-def _taken_off(axis: Axis, before: float, after: float) -> float:
-    """How many times as much (N rms) a lag takes off as it leaves beside the noise.
+def _takes_off(axis: Axis, before: float, after: float, times: float) -> bool:
+    """Whether a lag takes off so many times as much (N rms) as it leaves beside the noise.
 
     What another effect leaves, as a ripple or backlash, is in part explained by a lag too.
     """
     noise = axis.smoother.held_noise(axis.force_noise)
-    rest = max(after**2 - noise**2, np.finfo(float).tiny)
-    return float((max(before**2 - after**2, 0.0) / rest) ** 0.5)
+    return before**2 - after**2 > times**2 * max(after**2 - noise**2, 0.0)
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:
