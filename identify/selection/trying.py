@@ -106,12 +106,12 @@ def _refitted(
     among: of how many independent ones they are; effects of one kind are alike. known: what was
     refitted before.
     """
-    asked = RULE.promise * RULE.least_part
+    most = max((t.candidate.part for t in known), default=0.0)
+    asked = RULE.promise * max(RULE.least_part, most)
     waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
     refitting = partial(progress, "refitting the promising")
     first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS], refitting)
-    most = max((_roughly(judged, f) for _, f in first), default=0.0)
-    most = max([most, *(t.candidate.part for t in known)])
+    most = max([most, *(_roughly(judged, f) for _, f in first)])
     rest = [k for k in waiting[LEADERS:] if k.promise >= RULE.promise * most]
     fits = [*first, *spread(lambda k: (k, _fit_of(judged, k)), rest, refitting)]
     if not any(f.at_floor for _, f in fits):
