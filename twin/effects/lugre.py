@@ -49,6 +49,12 @@ def law(p, s, io):
     io[OUT] = sigma0 * z + sigma1 / io[DT] * change + viscous * io[VISCOUS] * v
 
 
+def bristles(values):
+    if values["n"] != 2.0:
+        return None
+    return tuple(values[name] for name in ("sigma0", "sigma1", "Fc", "Fs", "v0"))
+
+
 EFFECT = Effect(
     kind=Kind.FRICTION,
     summary="bristle friction: Stribeck curve, pre-sliding stiffness and damping",
@@ -65,6 +71,7 @@ EFFECT = Effect(
     states=("z",),
     law=law,
     joint_attributes=dry_and_viscous,
+    bristles=bristles,
     curves=STRIBECK_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",

@@ -41,16 +41,34 @@ def with_joint(text: str, joint: str, attributes: Mapping[str, float]) -> str:
     def changed(found: re.Match[str]) -> str:
         tag = found[0]
         # An equality constraint of that name is a joint as well, by its tag.
-        if found["kind"] != "joint" or _named(tag) != joint or re.search(r"\sjoint1\s*=", tag):
+        if (
+            found["kind"] != "joint"
+            or _attribute(tag, "name") != joint
+            or re.search(r"\sjoint1\s*=", tag)
+        ):
             return tag
-        for key, value in attributes.items():
-            own, pattern = f'{key}="{value:.9g}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
-            tag, count = re.subn(pattern, own, tag)
-            if not count:
-                tag = re.sub(r"\s*(/?>)$", rf" {own}\1", tag)
-        return tag
+        return _with(tag, {key: f"{value:.9g}" for key, value in attributes.items()})
 
     return _TAG.sub(changed, text)
+
+
+def with_motor(text: str, joint: str, attributes: Mapping[str, str]) -> str:
+    """An MJCF text with these attributes of the DC motor of that joint."""
+
+    def changed(found: re.Match[str]) -> str:
+        own = found["kind"] == "dcmotor" and _attribute(found[0], "joint") == joint
+        return _with(found[0], attributes) if own else found[0]
+
+    return _TAG.sub(changed, text)
+
+
+def _with(tag: str, attributes: Mapping[str, str]) -> str:
+    for key, value in attributes.items():
+        own, pattern = f'{key}="{value}"', rf"\b{key}\s*=\s*(\"[^\"]*\"|'[^']*')"
+        tag, count = re.subn(pattern, own, tag)
+        if not count:
+            tag = re.sub(r"\s*(/?>)$", rf" {own}\1", tag)
+    return tag
 
 
 def with_inertial(
@@ -96,13 +114,13 @@ def _place_of(text: str, joint: str) -> tuple[int, int] | None:
             if joint in body.joints:
                 return body.own or (body.begin, body.begin)
         elif kind == "joint" and not found["end"]:
-            within[-1].joints.append(_named(found[0]))
+            within[-1].joints.append(_attribute(found[0], "name"))
         elif kind == "inertial":
             begin = within[-1].own[0] if found["end"] and within[-1].own else found.start()
             within[-1].own = (begin, found.end())
     return None
 
 
-def _named(tag: str) -> str | None:
-    found = re.search(r"\sname\s*=\s*[\"']([^\"']*)[\"']", tag)
+def _attribute(tag: str, name: str) -> str | None:
+    found = re.search(rf"\s{name}\s*=\s*[\"']([^\"']*)[\"']", tag)
     return found[1] if found else None

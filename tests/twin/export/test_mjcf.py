@@ -49,6 +49,46 @@ def test_it_moves_as_the_machine_in_bare_mujoco():
     assert np.abs(pushed(made, False) - pushed(ARM, False)).max() > 0.1
 
 
+DRIVEN = """<mujoco model="slide">
+  <option timestep="1e-4" gravity="0 0 0"/>
+  <worldbody><body><joint name="x" type="slide"/><geom size="0.1" mass="1e6"/></body></worldbody>
+  <actuator><!-- of the drive --><dcmotor name="m" joint="x" gear="4"
+    motorconst="1e-4 1e-4" resistance="1"/></actuator>
+</mujoco>"""
+BRISTLES = {"Fc": 3.0, "Fs": 5.0, "v0": 0.01, "sigma0": 1000.0, "sigma1": 2.0, "sigma2": 7.0}
+
+
+def dragged(text: str, speed: float) -> np.ndarray:
+    """The force on the slide while it moves at that speed, over 0.2 s."""
+    made = mujoco.MjModel.from_xml_string(text)
+    data, force = mujoco.MjData(made), []
+    for _ in range(2000):
+        data.qvel[0] = speed
+        mujoco.mj_step(made, data)
+        force.append(data.qfrc_actuator[0] + data.qfrc_passive[0])
+    return np.array(force)
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.01, -0.05])
+def test_a_dc_motor_holds_lugre_friction_as_it_is(speed):
+    axis = AxisModel(1.0, effects=(fitted("lugre", **BRISTLES),), mass_fixed=True)
+    made = export(MachineModel("slide", {"x": axis}, 1000.0, DRIVEN, "slide.xml"), {})
+    text = made.files["slide.xml"]
+    assert isinstance(text, str)
+    assert (made.kept["x"], made.approximated, made.lost) == (("lugre",), (), ())
+    assert "<!-- of the drive -->" in text
+    b, z, wanted = BRISTLES, 0.0, []
+    for _ in range(2000):
+        level = b["Fc"] + (b["Fs"] - b["Fc"]) * np.exp(-((speed / b["v0"]) ** 2))
+        rate = speed - b["sigma0"] * abs(speed) / level * z
+        wanted.append(-b["sigma0"] * z - b["sigma1"] * rate - b["sigma2"] * speed)
+        z += 1e-4 * rate
+    np.testing.assert_allclose(dragged(text, speed), wanted, rtol=2e-3)
+    other = replace(axis, effects=(fitted("lugre", **BRISTLES, n=1.0),))
+    nearly = export(MachineModel("slide", {"x": other}, 1000.0, DRIVEN, "slide.xml"), {})
+    assert [r.part for r in nearly.approximated] == ["lugre"]
+
+
 def test_a_joint_may_have_the_name_of_an_attribute():
     named = ARM.replace('"elbow"', '"joint1"')
     whole = model(named)

@@ -5,12 +5,15 @@ them hold it (``Effect.joint_attributes``). The text of the file stays as it is,
 they lose of an effect is told along logs: the force that it makes in the model less that of
 
     -frictionloss sgn(v) - damping v - stiffness (q - springref)
+
+Where a DC motor of MuJoCo drives the joint, that motor holds LuGre friction as it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +25,7 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.mujoco.mechanism import PASSIVE
 from twin.mujoco.mjcf import read_spec
-from twin.mujoco.written import in_mjcf, with_joint
+from twin.mujoco.written import in_mjcf, with_joint, with_motor
 from twin.signals import Array, between
 
 UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
@@ -63,6 +66,9 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     """The text with the attributes of one joint; what was there of friction and springs goes."""
     joint, wanted = own.joint or axis, attributes_of(own)
     spec = read_spec(text, name)
+    if (gear := _gear(spec, joint)) and (found := _bristles(own)):
+        text = with_motor(text, joint, {"lugre": _at_motor(found, gear)})
+        wanted.pop("frictionloss", None)
     there = spec.joint(joint)
     if there is None:
         raise InputError(f"{name}: has no joint '{joint}', which is axis {axis}; name them alike")
@@ -75,11 +81,36 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     return with_joint(text, joint, new)
 
 
+def _bristles(own: AxisModel) -> tuple[float, ...] | None:
+    """Of the friction of an axis, where MuJoCo's own LuGre law is that."""
+    law = own.friction
+    return None if law is None or law.effect.bristles is None else law.effect.bristles(law.values)
+
+
+def _gear(spec: Any, joint: str) -> float:
+    """Of the one DC motor that drives a joint; 0 where there is none."""
+    import mujoco
+
+    kind = mujoco.mjtBias.mjBIAS_DCMOTOR
+    gears = [a.gear[0] for a in spec.actuators if a.target == joint and a.biastype == kind]
+    return float(gears[0]) if len(gears) == 1 else 0.0
+
+
+def _at_motor(bristles: tuple[float, ...], gear: float) -> str:
+    """The same on the motor's side of a gear, as the file has them."""
+    stiffness, damping, dry, static, stribeck = bristles
+    ratio = abs(gear)
+    at = stiffness / ratio**2, damping / ratio**2, dry / ratio, static / ratio, stribeck * ratio
+    return " ".join(f"{v:.9g}" for v in at)
+
+
 def _judged(
     model: MachineModel, axis: str, logs: Mapping[str, Log]
 ) -> tuple[tuple[str, ...], list[Remark], list[Remark]]:
     """Which effects of an axis the joint holds, holds nearly, and does not hold."""
     own, unit = model.axes[axis], model.axes[axis].units.force
+    spec = read_spec(in_mjcf(model.mjcf or "", model.mjcf_name or ""), model.mjcf_name or "")
+    driven = _gear(spec, own.joint or axis)
     motions = [_motion(log.axes[axis].position, log.period) for log in logs.values()]
     on = ", ".join(logs) or "a sine over its travel"
     motions = motions or [_swing(own)]
@@ -87,7 +118,8 @@ def _judged(
     for f in own.effects:
         alone = AxisModel(own.mass, effects=(f,), rotary=own.rotary)
         held = f.effect.joint_attributes(f.values) if f.effect.joint_attributes else {}
-        if f.effect.kind is Kind.STRUCTURE and held:  # an inertia, which is what it is
+        own_law = f is own.friction and driven and _bristles(own)
+        if own_law or (f.effect.kind is Kind.STRUCTURE and held):  # it is what it is
             kept.append(f.effect.name)
             continue
         loss = _loss(alone, held, motions)
