@@ -197,9 +197,11 @@ class Effect:
     joint_attributes: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Values by name -> attributes of a joint of MuJoCo that hold the effect, or come nearest to
     it: frictionloss, damping, stiffness, springref, armature, in SI units; None: none does."""
-    bristles: Callable[[Mapping[str, float]], tuple[float, ...] | None] | None = None
-    """Values by name -> bristle stiffness N/m and damping N s/m, Coulomb and static friction N and
-    Stribeck velocity m/s of MuJoCo's own LuGre friction, which its DC motors have; None: none."""
+    motor_attributes: Callable[[Mapping[str, float], float], Mapping[str, Sequence[float]]] = (
+        lambda values, gear: {}
+    )
+    """(values by name, gear) -> attributes of a DC motor of MuJoCo that hold the effect as it is,
+    but for what is viscous, in SI units."""
     of_joints: bool | None = None
     """Whether a diagnosis offers it on joints of a mechanism alone (True) or on plain axes alone
     (False), as what it is there is known from the bodies; None: on both."""

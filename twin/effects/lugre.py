@@ -49,10 +49,11 @@ def law(p, s, io):
     io[OUT] = sigma0 * z + sigma1 / io[DT] * change + viscous * io[VISCOUS] * v
 
 
-def bristles(values):
+def motor_attributes(values, gear):
     if values["n"] != 2.0:
-        return None
-    return tuple(values[name] for name in ("sigma0", "sigma1", "Fc", "Fs", "v0"))
+        return {}
+    turns = {"sigma0": gear**-2, "sigma1": gear**-2, "Fc": 1.0 / gear, "Fs": 1.0 / gear, "v0": gear}
+    return {"lugre": [values[name] * turn for name, turn in turns.items()]}
 
 
 EFFECT = Effect(
@@ -71,7 +72,7 @@ EFFECT = Effect(
     states=("z",),
     law=law,
     joint_attributes=dry_and_viscous,
-    bristles=bristles,
+    motor_attributes=motor_attributes,
     curves=STRIBECK_CURVES,
     fingerprint="residual after every reversal over a few bristle deflections of travel",
     excited_by="slow reversals of a few micrometres to millimetres, and a velocity staircase",

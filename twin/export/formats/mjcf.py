@@ -66,8 +66,8 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     """The text with the attributes of one joint; what was there of friction and springs goes."""
     joint, wanted = own.joint or axis, attributes_of(own)
     spec = read_spec(text, name)
-    if (gear := _gear(spec, joint)) and (found := _bristles(own)):
-        text = with_motor(text, joint, {"lugre": _at_motor(found, gear)})
+    if at_motor := _at_motor(own, _gear(spec, joint)):
+        text = with_motor(text, joint, at_motor)
         wanted.pop("frictionloss", None)
     there = spec.joint(joint)
     if there is None:
@@ -81,10 +81,12 @@ def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
     return with_joint(text, joint, new)
 
 
-def _bristles(own: AxisModel) -> tuple[float, ...] | None:
-    """Of the friction of an axis, where MuJoCo's own LuGre law is that."""
-    law = own.friction
-    return None if law is None or law.effect.bristles is None else law.effect.bristles(law.values)
+def _at_motor(own: AxisModel, gear: float) -> dict[str, str]:
+    """Attributes of the motor that drives a joint, which hold its friction as it is."""
+    if own.friction is None or not gear:
+        return {}
+    held = own.friction.effect.motor_attributes(own.friction.values, abs(gear))
+    return {key: " ".join(f"{v:.9g}" for v in values) for key, values in held.items()}
 
 
 def _gear(spec: Any, joint: str) -> float:
@@ -96,21 +98,13 @@ def _gear(spec: Any, joint: str) -> float:
     return float(gears[0]) if len(gears) == 1 else 0.0
 
 
-def _at_motor(bristles: tuple[float, ...], gear: float) -> str:
-    """The same on the motor's side of a gear, as the file has them."""
-    stiffness, damping, dry, static, stribeck = bristles
-    ratio = abs(gear)
-    at = stiffness / ratio**2, damping / ratio**2, dry / ratio, static / ratio, stribeck * ratio
-    return " ".join(f"{v:.9g}" for v in at)
-
-
 def _judged(
     model: MachineModel, axis: str, logs: Mapping[str, Log]
 ) -> tuple[tuple[str, ...], list[Remark], list[Remark]]:
     """Which effects of an axis the joint holds, holds nearly, and does not hold."""
     own, unit = model.axes[axis], model.axes[axis].units.force
     spec = read_spec(in_mjcf(model.mjcf or "", model.mjcf_name or ""), model.mjcf_name or "")
-    driven = _gear(spec, own.joint or axis)
+    at_motor = _at_motor(own, _gear(spec, own.joint or axis))
     motions = [_motion(log.axes[axis].position, log.period) for log in logs.values()]
     on = ", ".join(logs) or "a sine over its travel"
     motions = motions or [_swing(own)]
@@ -118,8 +112,8 @@ def _judged(
     for f in own.effects:
         alone = AxisModel(own.mass, effects=(f,), rotary=own.rotary)
         held = f.effect.joint_attributes(f.values) if f.effect.joint_attributes else {}
-        own_law = f is own.friction and driven and _bristles(own)
-        if own_law or (f.effect.kind is Kind.STRUCTURE and held):  # it is what it is
+        by_motor = f is own.friction and at_motor
+        if by_motor or (f.effect.kind is Kind.STRUCTURE and held):  # it is what it is
             kept.append(f.effect.name)
             continue
         loss = _loss(alone, held, motions)
