@@ -81,11 +81,12 @@ class MujocoSimulator:
     def __init__(self, model: MachineModel, table: Table) -> None:
         import mujoco
 
-        from twin.mujoco.mechanism import driven, jointed_spec
+        from twin.mujoco.mechanism import driven, followed_by, jointed_spec
         from twin.mujoco.mjcf import machine_spec
 
+        self._followed = None
         if model.joints:
-            spec, axes = jointed_spec(model), driven(model)
+            spec, axes, self._followed = jointed_spec(model), driven(model), followed_by(model)
         else:
             spec = machine_spec(model)
             pairs = zip(model.axes, table.masses, strict=True)
@@ -123,8 +124,12 @@ class MujocoSimulator:
     ) -> None:
         """See Stepper."""
         self.data.time = first * self.model.opt.timestep
-        self.data.qpos[self._where[:, 0]] = position
-        self.data.qvel[self._where[:, 1]] = velocity
+        if (joints := self._followed) is None:
+            self.data.qpos[self._where[:, 0]] = position
+            self.data.qvel[self._where[:, 1]] = velocity
+        else:
+            self.data.qpos[:] = joints.ratio * position[joints.axis] + joints.offset
+            self.data.qvel[:] = joints.ratio * velocity[joints.axis]
         self.data.qpos[self._attached[:, 0]] = states[self._attached[:, 2]]
         self.data.qvel[self._attached[:, 1]] = states[self._attached[:, 2] + 1]
         user = self.data.userdata[self.user_at :]

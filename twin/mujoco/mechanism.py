@@ -10,6 +10,10 @@ so that a weak form integrates the momentum by parts, and nothing is differentia
 4.3). dM/dt v is the change of M v as the joints move on with v. All of it is computed natively, by
 the same library as the callback.
 
+A joint that is no axis may follow one, by an equality constraint that is linear in its position,
+as the second finger of a gripper does: then it moves by a ratio of the axis, and its forces reach
+the axis by the same ratio.
+
 What a joint has of friction, damping, springs and rotor inertia is the matter of the machine
 model's effects, and is not among the bodies. Geometry is needed for none of this, so that the
 meshes of a file need not be there.
@@ -17,7 +21,7 @@ meshes of a file need not be there.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -68,18 +72,38 @@ def _is_mesh(geom: mujoco.MjsGeom) -> bool:
     return geom.type in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """By which axis each joint moves: at its position times ratio (n_joints,), plus offset.
+
+    axis (n_joints,): its number. Hinges and slides: joints, positions and degrees of freedom are as
+    many, in one order.
+    """
+
+    axis: NDArray[np.int64]
+    ratio: Array
+    offset: Array
+
+    def reduced(self, full: Array, n_axes: int) -> Array:
+        """A matrix (n_joints, n_joints) of the joints as one (n_axes, n_axes) of the axes."""
+        by = np.zeros((len(self.axis), n_axes))
+        by[np.arange(len(self.axis)), self.axis] = self.ratio
+        return np.asarray(by.T @ full @ by)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mechanism:
     """The bodies of a machine, whose axes are joints.
 
-    model: of the bodies alone. places (2, n_axes): of each axis in qpos and among the degrees of
-    freedom. inertia (n_axes,): kg or kg m^2, that of the bodies about each joint, the mean over
-    poses. freed (n_axes,): the least that is felt at each where all others are free.
+    model: of the bodies alone. places (n_axes,): of each axis among the joints. inertia (n_axes,):
+    kg or kg m^2, that of the bodies about each joint, the mean over poses. freed (n_axes,): the
+    least that is felt at each where all others are free.
     """
 
     model: mujoco.MjModel
     axes: tuple[str, ...]
     places: NDArray[np.int64]
+    followed: Followed
     inertia: Array
     freed: Array
 
@@ -98,7 +122,8 @@ class Mechanism:
         data = mujoco.MjData(self.model)
         _along(
             tuple(map(native_address, CALLS)), self.model._address, data._address,
-            tuple(offsets()[2:]), self.places, *rows, np.zeros((5, self.model.nv)), momentum, force,
+            tuple(offsets()[2:]), self.followed.axis, self.followed.ratio, self.followed.offset,
+            *rows, np.zeros((5, self.model.nv)), momentum, force,
         )  # fmt: skip
         return momentum, force
 
@@ -114,18 +139,19 @@ class Mechanism:
     def bodies(self) -> tuple[str, ...]:
         """Name of the body that each axis moves, or of its joint where the body has none."""
         model = self.model
-        joints = model.dof_jntid[self.places[1]]
-        return tuple(model.body(model.jnt_bodyid[j]).name or model.joint(j).name for j in joints)
+        return tuple(
+            model.body(model.jnt_bodyid[j]).name or model.joint(j).name for j in self.places
+        )
 
     def _body(self, axis: int) -> int:
         """Number of the body that an axis moves."""
-        return int(self.model.jnt_bodyid[self.model.dof_jntid[self.places[1, axis]]])
+        return int(self.model.jnt_bodyid[self.places[axis]])
 
     def moved_by(self, axis: int) -> list[int]:
         """The axes whose forces the body of one changes: its own, and those that carry it."""
-        dof, found = int(self.places[1, axis]), []
+        dof, found = int(self.places[axis]), set[int]()
         while dof >= 0:
-            found.append(int(np.flatnonzero(self.places[1] == dof)[0]))
+            found.add(int(self.followed.axis[dof]))
             dof = int(self.model.dof_parentid[dof])
         return sorted(found)
 
@@ -191,16 +217,16 @@ def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mec
         said = " ".join(str(error).split())
         raise InputError(f"{name}: MuJoCo cannot build it: {said}") from error
     found = {model.joint(j).name: j for j in range(model.njnt)}
-    _require_measured(model, name, joints, list(found))
-    at = [found[joint] for _, joint in joints]
-    places = np.stack([model.jnt_qposadr[at], model.jnt_dofadr[at]]).astype(np.int64)
+    at = _require_axes(model, name, joints, found)
+    followed = _followed(model, name, at)
     axes = tuple(axis for axis, _ in joints)
-    return Mechanism(model, axes, places, *(i[places[1]] for i in _inertias(model)))
+    return Mechanism(model, axes, at, followed, *_inertias(model, at, followed))
 
 
-def _require_measured(
-    model: mujoco.MjModel, name: str, joints: Sequence[tuple[str, str]], found: Collection[str]
-) -> None:
+def _require_axes(
+    model: mujoco.MjModel, name: str, joints: Sequence[tuple[str, str]], found: Mapping[str, int]
+) -> NDArray[np.int64]:
+    """Which joint each axis is."""
     used: dict[str, str] = {}
     for axis, joint in joints:
         if joint not in found:
@@ -218,12 +244,39 @@ def _require_measured(
                 "a ball joint cannot be an axis"
             )
         used[joint] = axis
-    lacking = [n or "one without a name" for n in found if n not in used]
+    return np.array([found[joint] for joint in used], dtype=np.int64)
+
+
+def _followed(model: mujoco.MjModel, name: str, at: NDArray[np.int64]) -> Followed:
+    """The axis that each joint is or follows; InputError where the motion of one is not known."""
+    axis, ratio, offset = np.full(model.njnt, -1), np.ones(model.njnt), np.zeros(model.njnt)
+    axis[at] = np.arange(len(at))
+    ties = list(_ties(model))
+    for _ in ties:  # one may follow by another
+        for one, other, slope, begin in ties:
+            if axis[one] < 0 <= axis[other]:
+                axis[one] = axis[other]
+                ratio[one], offset[one] = slope * ratio[other], begin + slope * offset[other]
+    lacking = [model.joint(j).name or "one without a name" for j in np.flatnonzero(axis < 0)]
     if lacking:
         raise InputError(
             f"{name}: the joints {', '.join(lacking)} are no axes, so that their motion is not "
-            "known; measure them as axes, or take these joints out of the file"
+            "known; measure them as axes, tie them to one by an equality of the file, or take "
+            "them out of it"
         )
+    return Followed(axis.astype(np.int64), ratio, offset)
+
+
+def _ties(model: mujoco.MjModel) -> Iterator[tuple[int, int, float, float]]:
+    """Of each linear equality of two joints: q_one = slope q_other + begin, both ways round."""
+    for k in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+        one, other = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        constant, slope, *bends = model.eq_data[k, :5]
+        if other < 0 or slope == 0.0 or any(bends):
+            continue
+        begin = model.qpos0[one] + constant - slope * model.qpos0[other]
+        yield one, other, float(slope), float(begin)
+        yield other, one, float(1.0 / slope), float(-begin / slope)
 
 
 @dataclass(frozen=True)
@@ -237,13 +290,15 @@ class Joint:
 def joints_of(text: str, name: str, joints: Mapping[str, str]) -> dict[str, Joint]:
     """The joints of an MJCF or URDF text by axis; raises InputError as ``mechanism_of`` does."""
     found = mechanism_of(text, name, joints)
-    turns = found.model.jnt_type[found.model.dof_jntid[found.places[1]]] == HINGE
+    turns = found.model.jnt_type[found.places] == HINGE
     pairs = zip(joints, turns, found.inertia, strict=True)
     return {axis: Joint(bool(turns), float(inertia)) for axis, turns, inertia in pairs}
 
 
-def _inertias(model: mujoco.MjModel) -> tuple[Array, Array]:
-    """Inertia (nv,) about each joint, kg or kg m^2, over poses within the joints' ranges.
+def _inertias(
+    model: mujoco.MjModel, at: NDArray[np.int64], followed: Followed
+) -> tuple[Array, Array]:
+    """Inertia (n_axes,) about each axis, kg or kg m^2, over poses within the joints' ranges.
 
     With all others held the mean: in one pose it may vanish, such as that of a straight arm about
     its own line. With all others free the least.
@@ -251,15 +306,17 @@ def _inertias(model: mujoco.MjModel) -> tuple[Array, Array]:
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     turns = model.jnt_type == HINGE
     free = np.where(turns, np.pi, 0.0)[:, None] * [-1.0, 1.0]
-    low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free).T
-    total, full = np.zeros(model.nv), np.zeros((model.nv, model.nv))
-    least = np.full(model.nv, np.inf)
+    low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free)[at].T
+    total, full = np.zeros(len(at)), np.zeros((model.nv, model.nv))
+    least = np.full(len(at), np.inf)
     for _ in range(POSES):
-        data.qpos[model.jnt_qposadr] = rng.uniform(low, high)
+        pose = rng.uniform(low, high)
+        data.qpos[:] = followed.ratio * pose[followed.axis] + followed.offset
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
-        total += np.diag(full) / POSES
-        least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(full)))
+        own = followed.reduced(full, len(at))
+        total += np.diag(own) / POSES
+        least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(own)))
     return total, least
 
 
@@ -274,6 +331,8 @@ def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
     for part in (*spec.actuators, *spec.sensors, *spec.keys):
         spec.delete(part)
     spec.option.timestep = model.period
+    for tie in spec.equalities:
+        tie.solref[:] = 2.0 * model.period, 1.0  # as stiff as can be: its give is not identified
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     for axis, own in model.axes.items():
         for f in own.effects:
@@ -303,6 +362,11 @@ def driven(model: MachineModel) -> list[Driven]:
     ]
 
 
+def followed_by(model: MachineModel) -> Followed:
+    """The axis that each joint of such a spec is or follows."""
+    return mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints).followed
+
+
 def _strip(joint: mujoco.MjsJoint) -> None:
     """Take from a joint what is the matter of effects."""
     for key in PASSIVE:
@@ -311,21 +375,22 @@ def _strip(joint: mujoco.MjsJoint) -> None:
 
 @compiled(nogil=True)
 def _along(
-    calls, model, data, off, places, position, velocity, smooth, lent, momentum, force
+    calls, model, data, off, axis, ratio, offset, position, velocity, smooth, lent, momentum, force
 ):  # fmt: skip
     kinematics, com_pos, make_m, com_vel, rne, mul_m = calls
-    n_axes, n_dofs = places.shape[1], lent.shape[1]
+    n_axes, n_dofs = position.shape[0], lent.shape[1]
     moved, product, before, after, bias = lent
     qpos = view(word_at(data + off[2]), n_dofs)  # hinges and slides: as many as degrees of freedom
     qvel = view(word_at(data + off[3]), n_dofs)
     speed = word_at(data + off[3])
     for k in range(position.shape[1]):
         fastest = 0.0
-        for a in range(n_axes):
-            qpos[places[0, a]] = position[a, k]
-            qvel[places[1, a]] = smooth[a, k]
-            moved[places[1, a]] = velocity[a, k]
-            fastest = max(fastest, abs(smooth[a, k]))
+        for i in range(n_dofs):
+            a = axis[i]
+            qpos[i] = offset[i] + ratio[i] * position[a, k]
+            qvel[i] = ratio[i] * smooth[a, k]
+            moved[i] = ratio[i] * velocity[a, k]
+            fastest = max(fastest, abs(qvel[i]))
         call_at(kinematics, (model, data))
         call_at(com_pos, (model, data))
         call_at(make_m, (model, data))
@@ -334,13 +399,14 @@ def _along(
         call_at(com_vel, (model, data))
         call_at(rne, (model, data, 0, bias.ctypes.data))  # 0: without accelerations
         ahead = AHEAD / max(fastest, AHEAD)
-        for a in range(n_axes):
-            qpos[places[0, a]] += ahead * smooth[a, k]
+        for i in range(n_dofs):
+            qpos[i] += ahead * qvel[i]
         call_at(kinematics, (model, data))
         call_at(com_pos, (model, data))
         call_at(make_m, (model, data))
         call_at(mul_m, (model, data, after.ctypes.data, speed))
         for a in range(n_axes):
-            i = places[1, a]
-            momentum[a, k] = product[i]
-            force[a, k] = bias[i] - (after[i] - before[i]) / ahead
+            momentum[a, k] = force[a, k] = 0.0
+        for i in range(n_dofs):
+            momentum[axis[i], k] += ratio[i] * product[i]
+            force[axis[i], k] += ratio[i] * (bias[i] - (after[i] - before[i]) / ahead)

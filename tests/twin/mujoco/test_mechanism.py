@@ -26,10 +26,20 @@ def smooth_motion(step: float, count: int) -> tuple[np.ndarray, np.ndarray, np.n
     return np.sin(at), rate * np.cos(at), -(rate**2) * np.sin(at)
 
 
-def test_momentum_form_is_the_inverse_dynamics():
-    step = 1e-3
-    q, v, a = smooth_motion(step, 60)
-    mechanism = mechanism_of(ARM, "arm.xml", OWN)
+TIE = '<equality><joint joint1="elbow" joint2="shoulder" polycoef="0.2 -1.5 0 0 0"/></equality>'
+TIED = ARM.replace("</mujoco>", f"{TIE}</mujoco>")
+ALL = {"text": ARM, "by": np.eye(3), "begun": np.zeros(3)}
+FOLLOWED = {
+    "text": TIED, "by": np.array([[1, 0], [0, 1], [0, -1.5]]), "begun": np.array([0, 0, 0.2]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("of", [ALL, FOLLOWED], ids=["all axes", "the elbow follows"])
+def test_momentum_form_is_the_inverse_dynamics(of):
+    """A joint that follows an axis is moved, and felt, by the ratio of their motions."""
+    step, n = 1e-3, of["by"].shape[1]
+    q, v, a = (rows[:n] for rows in smooth_motion(step, 60))
+    mechanism = mechanism_of(of["text"], "arm.xml", dict(list(OWN.items())[:n]))
     momentum, force = mechanism.along(q, v, v)
     # Of fourth order: a difference of second order would be the larger error.
     near, far = momentum[:, 3:-1] - momentum[:, 1:-3], momentum[:, 4:] - momentum[:, :-4]
@@ -37,9 +47,10 @@ def test_momentum_form_is_the_inverse_dynamics():
     model = mujoco.MjModel.from_xml_string(ARM)
     data, wanted = mujoco.MjData(model), []
     for k in range(2, q.shape[1] - 2):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[:, k], v[:, k], a[:, k]
+        data.qpos[:] = of["by"] @ q[:, k] + of["begun"]
+        data.qvel[:], data.qacc[:] = of["by"] @ v[:, k], of["by"] @ a[:, k]
         mujoco.mj_inverse(model, data)
-        wanted.append(data.qfrc_inverse.copy())
+        wanted.append(of["by"].T @ data.qfrc_inverse)
     largest = np.abs(wanted).max(axis=0)
     assert np.all(np.abs(ours - np.transpose(wanted)).max(axis=1) < 1e-6 * largest)
 
