@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +90,7 @@ class Remainder:
         columns = unabsorbed(self._over("time"), self.basis)
         return count > 1 and self._stand_out(self.force, self.basis, [columns], apart)
 
-    @property
+    @cached_property
     def _spans(self) -> list[NDArray[np.int64]]:
         """Where each log is."""
         edges = np.flatnonzero(np.diff(self.logs)) + 1

@@ -196,8 +196,9 @@ def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> 
 def _in_simplest_values(judged: Judged, steps: tuple[Step, ...]) -> Judged:
     """The fit with the simplest values of what was added, which later steps may have cleared."""
     fit = judged.fit
-    for change in (s.change for s in steps if isinstance(s.change, Added)):
-        fit = in_simplest_values(fit, fit.axis[change.name].effect)
+    added = {s.change.name for s in steps if isinstance(s.change, Added)}
+    for law in (f for f in judged.fit.axis.effects if f.effect.name in added):
+        fit = in_simplest_values(fit, law.effect)
     if fit is judged.fit:
         return judged
     return Judged(replace(fit, begun=judged.fit.begun), judged.dataset)

@@ -136,6 +136,18 @@ def with_hum(log: Log, seed: int, times: float = 1.0) -> Log:
     return log_of(RATE, x.position, x.force + times * hum(seed))
 
 
+def test_a_ripple_of_narrow_peaks_resembles_the_law_that_a_curve_replaces() -> None:
+    """What was added is not there any more when a free curve has taken its place."""
+
+    def ripple(x: Array, _: Array) -> Array:
+        return 0.3 * np.exp(-(((np.mod(x / 0.012, 1.0) - 0.5) / 0.1) ** 2))
+
+    found = asked(SLIDE, SLIDE, few("cogging", "quadratic_drag"), beside=ripple)
+    assert found.named == ("cogging",)
+    assert found.findings[0].kind is FindingKind.RESEMBLES
+    assert "cogging" not in found.final.axis.names
+
+
 def test_stops_are_found_where_the_logs_end_whatever_the_travel_of_the_model() -> None:
     true = having(SLIDE, "end_stop", low=-0.054, high=0.054, stiffness=400.0)
     wide = replace(SLIDE, hardware=replace(HARDWARE, travel=(-0.09, 0.108)))

@@ -41,9 +41,11 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
         )
     name = model.mjcf_name or "model.xml"
     text = in_mjcf(model.mjcf, name)
+    spec = read_spec(text, name)
+    at_motor = {a: _at_motor(own, _gear(spec, own.joint or a)) for a, own in model.axes.items()}
     for axis, own in model.axes.items():
-        text = _with_attributes(text, name, axis, own)
-    judged = {axis: _judged(model, axis, logs) for axis in model.axes}
+        text = _with_attributes(text, name, spec, axis, own, at_motor[axis])
+    judged = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
     return Exported(
         {f"{Path(name).stem}.xml": text},
         {axis: kept for axis, (kept, _, _) in judged.items()},
@@ -62,11 +64,15 @@ def attributes_of(axis: AxisModel) -> dict[str, float]:
     return found
 
 
-def _with_attributes(text: str, name: str, axis: str, own: AxisModel) -> str:
-    """The text with the attributes of one joint; what was there of friction and springs goes."""
+def _with_attributes(
+    text: str, name: str, spec: Any, axis: str, own: AxisModel, at_motor: Mapping[str, str]
+) -> str:
+    """The text with the attributes of one joint; what was there of friction and springs goes.
+
+    spec: of the file. at_motor: the attributes of the joint's motor that hold its friction.
+    """
     joint, wanted = own.joint or axis, attributes_of(own)
-    spec = read_spec(text, name)
-    if at_motor := _at_motor(own, _gear(spec, joint)):
+    if at_motor:
         text = with_motor(text, joint, at_motor)
         wanted.pop("frictionloss", None)
     there = spec.joint(joint)
@@ -99,12 +105,13 @@ def _gear(spec: Any, joint: str) -> float:
 
 
 def _judged(
-    model: MachineModel, axis: str, logs: Mapping[str, Log]
+    model: MachineModel, axis: str, logs: Mapping[str, Log], by_motor: bool
 ) -> tuple[tuple[str, ...], list[Remark], list[Remark]]:
-    """Which effects of an axis the joint holds, holds nearly, and does not hold."""
+    """Which effects of an axis the joint holds, holds nearly, and does not hold.
+
+    by_motor: whether its motor holds its friction.
+    """
     own, unit = model.axes[axis], model.axes[axis].units.force
-    spec = read_spec(in_mjcf(model.mjcf or "", model.mjcf_name or ""), model.mjcf_name or "")
-    at_motor = _at_motor(own, _gear(spec, own.joint or axis))
     motions = [_motion(log.axes[axis].position, log.period) for log in logs.values()]
     on = ", ".join(logs) or "a sine over its travel"
     motions = motions or [_swing(own)]
@@ -112,8 +119,8 @@ def _judged(
     for f in own.effects:
         alone = AxisModel(own.mass, effects=(f,), rotary=own.rotary)
         held = f.effect.joint_attributes(f.values) if f.effect.joint_attributes else {}
-        by_motor = f is own.friction and at_motor
-        if by_motor or (f.effect.kind is Kind.STRUCTURE and held):  # it is what it is
+        inertia = f.effect.kind is Kind.STRUCTURE and held
+        if inertia or (by_motor and f is own.friction):  # it is what it is
             kept.append(f.effect.name)
             continue
         loss = _loss(alone, held, motions)
