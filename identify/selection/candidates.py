@@ -26,7 +26,7 @@ from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, Score, Taken, score
+from identify.selection.acceptance import TINY, Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel
 
@@ -143,6 +143,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
         if own_force and _is_of_the_file(alone, dataset):
             return "a tenth more or less of what the bodies of the file weigh could be it"
+        if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
+            return "it takes the place of the friction, which another friction would"
     masses = (before.fit.axis.mass, before.fit.begun.mass)
     # 3 times the moved mass of the base or its start, that an effect may leave
     if not any(m <= 3.0 * fit.axis.mass for m in masses):
@@ -175,6 +177,19 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
     part = float(load @ force) / float(load @ load)
     left = force - part * load
     return abs(part) < accuracy and float(left @ left) < SAME_FORCE * float(force @ force)
+
+
+def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
+    """Whether a force is most of the friction that has collapsed beside it."""
+    laws = (before.fit.axis.friction, fit.axis.friction, *alone.effects)
+    if None in laws:
+        return False
+    axes = (replace(alone, effects=(law,)) for law in laws if law)
+    was, now, own = (averaged_force(axis, before.dataset.fit) for axis in axes)
+    gone = was - now
+    left = gone - own * float(gone @ own) / max(float(own @ own), TINY)
+    collapsed = float(now @ now) < RULE.collapse**2 * float(was @ was)
+    return collapsed and float(left @ left) < SAME_FORCE * float(gone @ gone)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:

@@ -91,18 +91,30 @@ class Added:
         return Look(self, part_of(fit.error**2, left, fit.floor**2), axes)
 
     def _on_heads(self, judged: Judged, found: Sequence[Start]) -> Look:
-        """Another friction, which no linear step puts in the place of one: a fit on the heads."""
-        fit, heads = judged.fit, judged.dataset.heads
-        old = _refitted_to_heads(fit, judged.dataset)
+        """Another friction, which no linear step puts in the place of one: a fit on the heads.
+
+        What it takes of all training logs counts as well, as their heads may hold little of the
+        error.
+        """
+        fit, dataset = judged.fit, judged.dataset
+        heads, rests = dataset.heads, sticks(fit.axis)
+        old = _refitted_to_heads(fit, dataset)
+
+        def part(new: Fit, before: AxisModel, logs: Sequence[PreparedLog]) -> float:
+            both = moving(logs, rests or sticks(new.axis))
+            was, now = (float(np.mean(residual(a, logs)[both] ** 2)) for a in (before, new.axis))
+            return part_of(was, now, fit.floor**2)
+
+        def promise(new: Fit) -> float:
+            return max(part(new, old.axis, heads), part(new, fit.axis, dataset.fit))
+
         # 4 evaluations: more do not change which start is best
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, 4) for s in found]
-        best = sorted(fits, key=lambda f: f.error)
-        if best[0].error < old.error:
+        best = sorted(fits, key=promise, reverse=True)
+        if promise(best[0]) > 0.0:
             # 12 of the best one, where it helps: frictions with a memory need them
             best[0] = fit_roughly(best[0].axis, heads, 12)
-        both = moving(heads, sticks(old.axis) or sticks(best[0].axis))
-        before, after = (float(np.mean(residual(f.axis, heads)[both] ** 2)) for f in (old, best[0]))
-        return Look(self, part_of(before, after, old.floor**2), tuple(f.axis for f in best))
+        return Look(self, promise(best[0]), tuple(f.axis for f in best))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged, self.effect)

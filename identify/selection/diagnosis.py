@@ -178,9 +178,10 @@ def _with_own_noise(found: Found) -> Found:
 def _with_ties(found: Found) -> Found:
     """What a search found, with ties decided beside all that was found.
 
-    When an early change was compared with its rivals, the later ones were still missing.
+    When an early change was compared with its rivals, the later ones were still missing. Frictions
+    are compared once more by the values of the one that was found, which another's search may miss.
     """
-    if len(found.steps) < 2:
+    if len(found.steps) < 2 and not any(s.rivals for s in found.steps):
         return found
     return replace(found, steps=tuple(_compared_again(s, found) for s in found.steps))
 
@@ -201,7 +202,7 @@ def _compared_again(step: Step, found: Found) -> Step:
         law = rival.judged.fit.axis[rival.change.name]
         laws = [law]
         if law.effect.kind is Kind.FRICTION:  # whose values were those of another model
-            laws.append(_with_values_of(final.fit.axis[step.change.name], law))
+            laws.append(_as_free_as(final.fit.axis[step.change.name], law))
         fits = (fit_axis(axis.with_effect(each), found.dataset.fit) for each in laws)
         fit = min(fits, key=lambda f: f.error)
         return is_level(replace(rival, judged=Judged(fit, found.dataset)), own)
@@ -209,10 +210,10 @@ def _compared_again(step: Step, found: Found) -> Step:
     return replace(step, level=tuple(t for t in (*step.level, *step.rivals) if beside(t)))
 
 
-def _with_values_of(other: Fitted, law: Fitted) -> Fitted:
-    """A law with the values of another, where both have a parameter of that name."""
-    free = {n: v for n, v in other.values.items() if n in law.values and n not in law.fixed}
-    return replace(law, values={**law.values, **free})
+def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
+    """A law with the values of another, and as free, where both have a parameter of that name."""
+    free = {n: v for n, v in other.values.items() if n in law.values and n not in other.fixed}
+    return replace(law, values={**law.values, **free}, fixed=law.fixed.difference(free))
 
 
 def _small(found: Found) -> tuple[str, ...]:
