@@ -37,6 +37,7 @@ from twin.law_parts import (
 
 TURNS = 16  # reversals remembered
 FULL = 1.0 - 1e-12  # part of a gap that counts as all of it
+SLIDES = 1.0 - 1e-9  # part of the level that is all of it: nearer, rounding would decide
 NEAR = 1e-7  # gap below which its slope is that at its end
 SOFTEST = 100.0  # exponent beyond which the stiffness is as good as gone
 FORCE, DIRECTION, DEPTH, STACK = range(4)  # states; the stack comes last
@@ -70,7 +71,7 @@ def advance(p, s, io, level):
     soft = p[6] / (io[DRY] * max(p[1] * io[STATIC], p[0]))  # b/Fs
     deflected = 0.0
     for _ in range(TURNS):
-        if direction * s[FORCE] >= level:  # the axis slides
+        if direction * s[FORCE] >= SLIDES * level:  # the axis slides
             s[DEPTH] = 0.0
         depth = int(s[DEPTH])
         base = s[STACK + depth - 1] if depth > 0 else 0.0

@@ -1,8 +1,10 @@
 """Hysteresis in pre-sliding: frictions that remember where they turned close inner loops."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from friction_runs import PAPER, at_turns, friction
+from friction_runs import PAPER, along, at_turns, friction, time
 
 from twin.laws.trials import Motion, trace
 
@@ -81,3 +83,20 @@ def test_leuvens_stack_is_bounded(turns: int, least: int, most: int) -> None:
     still = np.zeros_like(v)
     states = trace(leuven.effect, leuven.values, Motion(1e-3, still, v, still)).states[-1]
     assert least <= states[leuven.effect.states.index("depth")] <= most
+
+
+@pytest.mark.parametrize("name", ["dahl", "lugre", "gms", "leuven", "modified_leuven"])
+def test_a_hundredth_of_a_change_makes_a_hundredth_of_the_force(name: str) -> None:
+    """Sliding, where rounding must not decide what is remembered: a fit follows derivatives."""
+    rng, t = np.random.default_rng(8), time(1.0)
+    slow = sum(a * np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for a, f in ((1, 2), (1, 7)))
+    law = friction(name)
+    free = [p.name for p in law.effect.parameters if law.values[p.name] and not p.fixed]
+
+    def change(parameter: str, part: float) -> np.ndarray:
+        more = replace(law, values={**law.values, parameter: law.values[parameter] * (1 + part)})
+        return along(more, 5e-3 * slow, 1e-4) - along(law, 5e-3 * slow, 1e-4)
+
+    for parameter in free:
+        large, small = change(parameter, 1e-5), change(parameter, 1e-7)
+        assert np.linalg.norm(small) < 0.02 * np.linalg.norm(large) + 1e-12, parameter
