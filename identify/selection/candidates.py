@@ -180,15 +180,20 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
 
 
 def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
-    """Whether a force is most of the friction that has collapsed beside it."""
-    laws = (before.fit.axis.friction, fit.axis.friction, *alone.effects)
+    """Whether a force is most of the friction that has collapsed beside it.
+
+    Below what the fit began with too: a friction that had taken the effect's place falls as well.
+    """
+    base = before.fit
+    laws = (fit.axis.friction, base.axis.friction, base.begun.friction, *alone.effects)
     if None in laws:
         return False
     axes = (replace(alone, effects=(law,)) for law in laws if law)
-    was, now, own = (averaged_force(axis, before.dataset.fit) for axis in axes)
+    now, was, begun, own = (averaged_force(axis, before.dataset.fit) for axis in axes)
     gone = was - now
     left = gone - own * float(gone @ own) / max(float(own @ own), TINY)
-    collapsed = float(now @ now) < RULE.collapse**2 * float(was @ was)
+    least = min(float(was @ was), float(begun @ begun))
+    collapsed = float(now @ now) < RULE.collapse**2 * least
     return collapsed and float(left @ left) < SAME_FORCE * float(gone @ gone)
 
 

@@ -12,9 +12,9 @@ from identify.estimation.residual_dependence import Dependence, Repeat, find_dep
 from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
-from identify.selection.changes import Added
+from identify.selection.changes import Added, Look
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
-from identify.selection.search import Found, Step, is_level, search
+from identify.selection.search import Found, Step, adds_friction, is_level, search
 from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -178,36 +178,48 @@ def _with_own_noise(found: Found) -> Found:
 def _with_ties(found: Found) -> Found:
     """What a search found, with ties decided beside all that was found.
 
-    When an early change was compared with its rivals, the later ones were still missing. Frictions
-    are compared once more by the values of the one that was found, which another's search may miss.
+    When an early change was compared with its rivals, the later ones were still missing. Of a
+    friction all others are rivals, whatever their own fits ended in.
     """
-    if len(found.steps) < 2 and not any(s.rivals for s in found.steps):
+    if len(found.steps) < 2 and not any(adds_friction(s.change) for s in found.steps):
         return found
     return replace(found, steps=tuple(_compared_again(s, found) for s in found.steps))
 
 
 def _compared_again(step: Step, found: Found) -> Step:
-    final = found.final
-    names = {s.change.name for s in found.steps}
+    final, names = found.final, {s.change.name for s in found.steps}
     axis = step.change.undone(final.fit.axis, found.base.fit.axis)
     if axis is None:
         return replace(step, level=())
     own = replace(step.tried, judged=final)
 
     def beside(rival: Tried) -> bool:
-        if not isinstance(rival.change, Added):
-            return rival.change.name not in names
         if rival.change.name in names:
             return False
+        if not isinstance(rival.change, Added):
+            return True
         law = rival.judged.fit.axis[rival.change.name]
-        laws = [law]
+        laws = [law] if rival.candidate.score else []
         if law.effect.kind is Kind.FRICTION:  # whose values were those of another model
             laws.append(_as_free_as(final.fit.axis[step.change.name], law))
         fits = (fit_axis(axis.with_effect(each), found.dataset.fit) for each in laws)
         fit = min(fits, key=lambda f: f.error)
         return is_level(replace(rival, judged=Judged(fit, found.dataset)), own)
 
-    return replace(step, level=tuple(t for t in (*step.level, *step.rivals) if beside(t)))
+    rivals = {t.change.name: t for t in (*_other_frictions(step, found), *step.level)}
+    return replace(step, level=tuple(t for t in rivals.values() if beside(t)))
+
+
+def _other_frictions(step: Step, found: Found) -> list[Tried]:
+    """All others of the catalogue, where a friction was added."""
+    if not adds_friction(step.change):
+        return []
+    others = [c for c in found.ranking if c.effect.kind is Kind.FRICTION and not c.doubt]
+    changes = [Added(c.effect) for c in others]
+    return [
+        Tried(change, Look(change, 0.0), Judged(c.fit, found.dataset), c)
+        for change, c in zip(changes, others, strict=True)
+    ]
 
 
 def _as_free_as(other: Fitted, law: Fitted) -> Fitted:

@@ -50,7 +50,6 @@ from twin.progress import Progress, silent, within
 class Step:
     """A change that was accepted, and those that are level with it.
 
-    rivals: other frictions that were accepted in its place; beside later changes they may be level.
     with_others: whether it is accepted only together with another step. held: whether a later free
     curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
     that were not needed any more beside it.
@@ -58,7 +57,6 @@ class Step:
 
     tried: Tried
     level: tuple[Tried, ...] = ()
-    rivals: tuple[Tried, ...] = ()
     with_others: bool = False
     held: bool = False
     dropped: tuple[str, ...] = ()
@@ -276,10 +274,7 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         best = _best_of(lowering)
     level = [t for t in lowering if t is not best and is_level(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
-    level = [t for t in (best, *level) if t is not first]
-    others = [t for t in proved if t not in (first, *level)]
-    rivals = [t for t in others if _adds_friction(t.change)] if _adds_friction(first.change) else []
-    return [Step(first, tuple(level), tuple(rivals))]
+    return [Step(first, tuple(t for t in (best, *level) if t is not first))]
 
 
 def _best_of(tried: Sequence[Tried]) -> Tried:
@@ -290,7 +285,8 @@ def _best_of(tried: Sequence[Tried]) -> Tried:
     return best
 
 
-def _adds_friction(change: Change) -> bool:
+def adds_friction(change: Change) -> bool:
+    """Whether it is another friction, in the place of one or where there is none."""
     return isinstance(change, Added) and _rubs(change)
 
 
