@@ -1,4 +1,4 @@
-"""A friction with a memory is told with those as good, and not as a hysteresis beside a friction."""
+"""A friction with a memory is told with those as good, not as a hysteresis beside friction."""
 
 from dataclasses import replace
 
