@@ -31,6 +31,7 @@ from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import ParameterReference
 
 Array = NDArray[np.float64]
+Logs = Sequence[PreparedLog]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,25 +97,26 @@ class Added:
         What it takes of all training logs counts as well, as their heads may hold little of the
         error.
         """
-        fit, dataset = judged.fit, judged.dataset
-        heads, rests = dataset.heads, sticks(fit.axis)
-        old = _refitted_to_heads(fit, dataset)
-
-        def part(new: Fit, before: AxisModel, logs: Sequence[PreparedLog]) -> float:
-            both = moving(logs, rests or sticks(new.axis))
-            was, now = (float(np.mean(residual(a, logs)[both] ** 2)) for a in (before, new.axis))
-            return part_of(was, now, fit.floor**2)
+        fit, heads = judged.fit, judged.dataset.heads
+        grounds = _before_a_friction(fit, judged.dataset)
 
         def promise(new: Fit) -> float:
-            return max(part(new, old.axis, heads), part(new, fit.axis, dataset.fit))
+            parts = []
+            for logs, before in grounds:
+                both = moving(logs, sticks(fit.axis) or sticks(new.axis))
+                was, now = (r[both] @ r[both] for r in (before, residual(new.axis, logs)))
+                parts.append(part_of(was / both.sum(), now / both.sum(), fit.floor**2))
+            return max(parts)
 
         # 4 evaluations: more do not change which start is best
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, 4) for s in found]
-        best = sorted(fits, key=promise, reverse=True)
-        if promise(best[0]) > 0.0:
+        promises = {f: promise(f) for f in fits}
+        first, *others = sorted(fits, key=lambda f: -promises[f])
+        if (most := promises[first]) > 0.0:
             # 12 of the best one, where it helps: frictions with a memory need them
-            best[0] = fit_roughly(best[0].axis, heads, 12)
-        return Look(self, promise(best[0]), tuple(f.axis for f in best))
+            first = fit_roughly(first.axis, heads, 12)
+            most = promise(first)
+        return Look(self, most, tuple(f.axis for f in (first, *others)))
 
     def refit(self, judged: Judged, look: Look) -> Fit:
         return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged, self.effect)
@@ -320,6 +322,8 @@ def _resting(without: Judged, fit: Judged) -> bool:
 
 
 @lru_cache(maxsize=4)  # every other friction is looked at beside the same fit
-def _refitted_to_heads(fit: Fit, dataset: Dataset) -> Fit:
-    """The axis of a fit, fitted to the heads alone."""
-    return fit_axis(fit.axis, dataset.heads)
+def _before_a_friction(fit: Fit, dataset: Dataset) -> tuple[tuple[Logs, Array], ...]:
+    """Heads and training logs, with the residual (n,) N of an axis fitted to each."""
+    refitted = fit_axis(fit.axis, dataset.heads).axis
+    pairs = ((dataset.heads, refitted), (dataset.fit, fit.axis))
+    return tuple((logs, residual(axis, logs)) for logs, axis in pairs)
