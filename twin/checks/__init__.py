@@ -1,4 +1,8 @@
-"""Checks whether a log is suitable for identification, before anything is fitted."""
+"""Checks whether a log is suitable for identification, before anything is fitted.
+
+Their thresholds are told by drives whose faults are known (tests/twin/checks): sound ones pass, and
+a fault is named from the size on that a fit would notice.
+"""
 
 from __future__ import annotations
 

@@ -8,12 +8,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.checks import limits
-from twin.checks.explain import Dynamics, Smoother, Trend, find_lag, find_trend, fit_dynamics
+from twin.checks.explain import (
+    KEPT_PART,
+    UNUSUAL,
+    Dynamics,
+    Smoother,
+    Trend,
+    find_lag,
+    find_trend,
+    fit_dynamics,
+)
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, usual_size, white_noise
 
+PHYSICAL = 10e-3  # s of lag, what a slow drive may account for
 READINGS = ("position", "velocity", "current", "force")
 
 
@@ -94,7 +103,8 @@ class Axis:
     @property
     def still(self) -> float:
         """Speed in m/s below which the noise of the position may be all there is."""
-        return limits.MOVING * self.smoother.velocity_noise(self.position_noise)
+        moving = 5.0  # speed, in units of its noise
+        return moving * self.smoother.velocity_noise(self.position_noise)
 
     @cached_property
     def moves(self) -> bool:
@@ -102,19 +112,22 @@ class Axis:
 
         An axis that is held at rest covers a little while its loop settles.
         """
-        if not np.ptp(self.log.position) > limits.COVERED * self.position_noise:
+        covered = 15.0  # rms of noise; of 3 million samples white noise covers 10
+        if not np.ptp(self.log.position) > covered * self.position_noise:
             return False
         moving = np.count_nonzero(np.abs(self.velocity) > self.still)
-        return bool(moving * self.smoother.block > limits.LEAST_MOTION)
+        least_motion = 0.3  # s; a loop that is closed at rest settles within half of that
+        return bool(moving * self.smoother.block > least_motion)
 
     @cached_property
     def possible_jump(self) -> float:
         """Largest second difference of the position, in m, that motion and noise explain."""
         usual = float(np.quantile(np.abs(self.acceleration), 0.99))
-        noise = limits.JUMP_NOISE * 6**0.5 * self.position_noise
-        possible = limits.IMPOSSIBLE * usual / self.sample_rate**2 + noise
+        noise = 10.0 * 6**0.5 * self.position_noise  # times the rms of noise
+        impossible = 4.0  # times the acceleration that 99 % of the samples stay below
+        possible = impossible * usual / self.sample_rate**2 + noise
         # What swings within the samples that were smoothed bends as much at half of them all.
-        return max(possible, limits.UNUSUAL * usual_size(np.diff(self.log.position, 2)))
+        return max(possible, UNUSUAL * usual_size(np.diff(self.log.position, 2)))
 
     @cached_property
     def jumps(self) -> Array:
@@ -144,7 +157,8 @@ class Axis:
 
         It stops gently and breaks loose at once, which looks like a force ahead of its motion.
         """
-        return self.kept * (np.abs(self.regressors[:, 2]) > limits.FULL_FRICTION)
+        full_friction = 0.95  # of Coulomb friction: a low-pass with less of it holds a standstill
+        return self.kept * (np.abs(self.regressors[:, 2]) > full_friction)
 
     @cached_property
     def lag(self) -> float:
@@ -155,11 +169,12 @@ class Axis:
         """
         found = self.lag_of(self.force, self.regressors)
         beside = self.lag_of(self.force, self.remembering) if found else 0.0
-        if not beside or abs(beside - found) >= limits.SAME_LAG * abs(found):
+        same_lag = 0.3  # largest difference of a lag with and without a memory, as a part of it
+        if not beside or abs(beside - found) >= same_lag * abs(found):
             return 0.0
         going, _ = find_lag(self.force, self.regressors, self.going, self.smoother.block)
-        told = self.going.mean() > limits.KEPT_PART
-        return going if told and abs(going - found) < limits.PHYSICAL else found
+        told = self.going.mean() > KEPT_PART
+        return going if told and abs(going - found) < PHYSICAL else found
 
     def lag_of(self, signal: Array, explained_by: Array) -> float:
         """Lag (s) of a signal (m,) behind its regressors (m, k); 0 where that is not clear."""
@@ -194,7 +209,8 @@ class Axis:
         """(m, 5) regressors of a command: mass, damping, Coulomb friction, bias, stiffness."""
         fast = float(np.quantile(np.abs(self.velocity), 0.99))
         position = self.smoother.position(self.log.position)
-        slow = max(limits.SLOW_SPEED * fast, float(np.finfo(float).tiny))
+        slow_speed = 0.02  # times the highest speed: below, Coulomb friction is not yet full
+        slow = max(slow_speed * fast, float(np.finfo(float).tiny))
         direction, one = self.smoother.direction(self.log.position, slow), np.ones_like(position)
         centred = position - position.mean()
         return np.column_stack([self.acceleration, self.velocity, direction, one, centred])
@@ -203,7 +219,9 @@ class Axis:
     def remembering(self) -> Array:
         """(m, 5 + k) regressors of a command, with friction that builds up over k distances."""
         position = self.smoother.position(self.log.position)
-        widths = np.ptp(position) * np.array(limits.PRESLIDING)
+        # of the way covered, over which friction may build up
+        presliding = (0.003, 0.01, 0.03, 0.1, 0.3)
+        widths = np.ptp(position) * np.array(presliding)
         return np.column_stack([self.regressors, *(_built_up(position, w) for w in widths)])
 
     @cached_property
@@ -217,14 +235,18 @@ class Axis:
         if setpoint is None:
             return False
         goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
-        if np.std(position) > limits.FALLS_SHORT * np.std(goal):
+        falls_short = 0.8  # of the setpoint's spread, up to which a position falls short of it
+        if np.std(position) > falls_short * np.std(goal):
             return False
         rates = [np.ones_like(goal), self.velocity, self.smoother.velocity(setpoint)]
         spring, left = _fitted(self.force, np.column_stack([goal - position, *rates]))
         apart = _fitted(self.force, np.column_stack([goal, position, *rates]))[1]
         size = float(np.std(self.force))
-        as_good = left < max(limits.AS_GOOD_GAINS * apart, limits.WELL * size)
-        return spring > 0.0 and left < limits.SPRING * size and as_good
+        as_good_gains = 1.5  # times what is left with two gains, that one may leave
+        well = 0.03  # or that part of the command
+        as_good = left < max(as_good_gains * apart, well * size)
+        # largest part of a command that a spring to the setpoint leaves
+        return spring > 0.0 and left < 0.3 * size and as_good
 
 
 def _fitted(signal: Array, columns: Array) -> tuple[float, float]:
@@ -254,14 +276,18 @@ def count_of(signal: Array) -> float:
     """
     edges = np.flatnonzero(np.diff(np.diff(signal) != 0.0, prepend=False, append=False))
     first, last = edges[::2], edges[1::2]
-    ways = np.abs(signal[last] - signal[first])[last - first <= limits.PASSED_IN]
+    passed_in = 4  # samples in which a count is passed
+    ways = np.abs(signal[last] - signal[first])[last - first <= passed_in]
     ways = ways[ways > 0.0]
-    if len(ways) < limits.FEWEST_COUNTS:
+    if len(ways) < 5:  # that tell one
         return 0.0
-    for count in np.quantile(ways, limits.ONE_COUNT):
+    # parts of the ways that may be less, as text far from 0 is coarser
+    one_count = (0.5, 0.25, 0.1)
+    for count in np.quantile(ways, one_count):
         off = np.abs(ways / count - np.round(ways / count))
-        whole = ways[(off < limits.WHOLE_WAY) & (ways > 0.5 * count)]
-        if whole.sum() > limits.OF_WHOLE_WAYS * ways.sum():
+        whole_way = 0.05  # of a count: how far a way may be off a whole one
+        whole = ways[(off < whole_way) & (ways > 0.5 * count)]
+        if whole.sum() > 0.9 * ways.sum():  # least part of the ways that are whole ones
             return float(count)
     return 0.0
 
@@ -272,13 +298,14 @@ def held_samples(signal: Array) -> int:
     if 3 * np.count_nonzero(changes) > 2 * len(signal):  # most from each sample to the next
         return 0
     change = np.flatnonzero(changes)
-    if len(change) < limits.FEWEST_CHANGES:
+    if len(change) < 50:  # of which that part is told
         return 0
     steps = np.diff(change)
     if np.count_nonzero(steps == 1) > len(steps) // 2:  # so is their median
         return 0
     count = int(np.median(steps))
-    if not 2 <= count <= limits.MOST_HELD:
+    if not 2 <= count <= 20:  # samples of one value; a slower channel is told by its lag
         return 0
     share = np.bincount(change % count).max() / len(change)
-    return count if share >= limits.PHASE else 0
+    phase = 0.95  # of the changes fall on one of every m samples where a signal is held
+    return count if share >= phase else 0

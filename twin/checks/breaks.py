@@ -15,12 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.checks import limits
 from twin.checks.axis import Axis
-from twin.checks.explain import contradicted
+from twin.checks.explain import UNUSUAL, contradicted
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
 
+CLUSTER = 3  # samples between two bends of one break
+ALIKE_SPEEDS = 0.3  # difference of two speeds, as a part of the larger
+SHORT_GAP = 0.05  # s, over which the speed may change, and which makes two breaks one
 CUT = "cut the log there (was an end stop hit, the carriage touched?)"
 
 
@@ -64,7 +66,7 @@ def find_breaks(axis: Axis) -> list[Break]:
     bends = _outside(stuck, bends)
     if not len(bends):
         return stuck
-    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > limits.CLUSTER) + 1)
+    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > CLUSTER) + 1)
     single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
     return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
 
@@ -81,8 +83,8 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
     out: list[Break] = []
     for b in breaks:
         last = out[-1] if out else None
-        if last is not None and b.first - last.last < limits.SHORT_GAP * axis.sample_rate:
-            opposed = abs(last.step + b.step) < limits.ALIKE_SPEEDS * abs(b.step)
+        if last is not None and b.first - last.last < SHORT_GAP * axis.sample_rate:
+            opposed = abs(last.step + b.step) < ALIKE_SPEEDS * abs(b.step)
             if opposed or {last.fault, b.fault} <= {Fault.OUTLIERS, Fault.UNEVEN}:
                 size = max(abs(last.size), abs(b.step or b.size))
                 skips = last.fault is b.fault is Fault.UNEVEN
@@ -97,7 +99,9 @@ def _stuck(axis: Axis) -> Iterator[Break]:
     """One value for long, with a bend where it begins and where it ends."""
     x = axis.log.position
     same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
-    least = max(limits.STUCK * axis.sample_rate, limits.STUCK_SAMPLES)
+    stuck = 5e-3  # s of one value
+    stuck_samples = 5  # at least, where so long is fewer
+    least = max(stuck * axis.sample_rate, stuck_samples)
     bends = axis.jumps > 0.0
     for first, last in zip(same[::2], same[1::2], strict=False):
         at_ends = all(bends[max(end - 3, 0) : end + 1].any() for end in (first, last))
@@ -115,22 +119,24 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
     step, before, after = course
     speed = 0.5 * (before + after) / dt
     larger = max(abs(before), abs(after))
-    alike = abs(before - after) <= limits.ALIKE_SPEEDS * larger + axis.possible_jump
-    if abs(step) <= limits.SURE_BREAK * axis.possible_jump:
-        if last - first > limits.CLUSTER:
+    alike = abs(before - after) <= ALIKE_SPEEDS * larger + axis.possible_jump
+    if abs(step) <= 6.0 * axis.possible_jump:  # times the bend that motion allows
+        if last - first > CLUSTER:
             return None
         off = float(axis.jumps[first - 1 : last].max())
-        fault = Fault.UNEVEN if off < limits.A_SAMPLE * abs(speed) * dt else Fault.OUTLIERS
+        a_sample = 2.0  # times the motion of a sample
+        fault = Fault.UNEVEN if off < a_sample * abs(speed) * dt else Fault.OUTLIERS
         return Break(fault, first, last, off)
     setpoint = axis.log.columns.get("setpoint_position")
     follows = _around(setpoint, first, last) if setpoint is not None else None
     with_setpoint = follows is not None and abs(follows[0]) > 0.5 * abs(step)
-    if abs(step) >= limits.WHOLE_TRAVEL * np.ptp(x) and alike and not with_setpoint:
+    whole_travel = 0.8  # of the travel; a counter that wraps goes back by nearly all of it
+    if abs(step) >= whole_travel * np.ptp(x) and alike and not with_setpoint:
         return Break(Fault.WRAPPED, first, last, abs(step))
     if setpoint is not None and not with_setpoint:
         return Break(Fault.STEP, first, last, step, step)
     samples = step / (speed * dt) if speed else np.inf
-    gap = limits.LONGEST_GAP if alike else limits.SHORT_GAP
+    gap = 2.0 if alike else SHORT_GAP  # s of missing samples
     if 0.5 < samples <= gap * axis.sample_rate:
         return Break(Fault.MISSING, first, last, float(round(samples)), step)
     return Break(Fault.STEP if alike else Fault.JOINED, first, last, step, step)
@@ -138,11 +144,12 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
 
 def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
     """The step of a signal's course, and its slopes a sample before and behind."""
+    course = 10  # samples on either side from which the course is told
     begin, end = first - 1, last + 1  # the last sample before, the first behind
-    if begin - limits.COURSE < 0 or end + limits.COURSE >= len(x):
+    if begin - course < 0 or end + course >= len(x):
         return None
-    before = float(x[begin] - x[begin - limits.COURSE]) / limits.COURSE
-    after = float(x[end + limits.COURSE] - x[end]) / limits.COURSE
+    before = float(x[begin] - x[begin - course]) / course
+    after = float(x[end + course] - x[end]) / course
     expected = 0.5 * (before + after) * (end - begin)
     return float(x[end] - x[begin]) - expected, before, after
 
@@ -185,8 +192,10 @@ def uneven_bends(axis: Axis) -> NDArray[np.intp]:
     if not len(bends) or axis.position_held:
         return bends[:0]
     bends = bends[axis.jumps[bends - 1] < 0.5 * float(np.ptp(axis.log.position))]
-    places = 1 + np.count_nonzero(np.diff(bends) > limits.SHORT_GAP * axis.sample_rate)
-    everywhere = places >= max(limits.MANY_BENDS, limits.EVERYWHERE * axis.duration)
+    places = 1 + np.count_nonzero(np.diff(bends) > SHORT_GAP * axis.sample_rate)
+    many_bends = 12  # places from which on it is not this and that, but the clock
+    # bends a second at least, where the clock is uneven
+    everywhere = places >= max(many_bends, 1.0 * axis.duration)
     return bends if everywhere else bends[:0]
 
 
@@ -224,10 +233,12 @@ def _rough_command(axis: Axis) -> Array:
     """Times (k,) in s within bursts of noise on the command."""
     force = axis.log.force
     second = np.abs(np.diff(force, 2))
-    rough = second > limits.ROUGH * axis.force_size
-    span = max(round(limits.ROUGH_SPAN * axis.sample_rate), 2 * limits.FEWEST_ROUGH)
+    rough = second > 0.1 * axis.force_size  # least roughness, as a part of the command
+    rough_span = 10e-3  # s, in which half of the samples are rough; a commanded step is only a few
+    fewest_rough = 5  # samples, where so long is fewer
+    span = max(round(rough_span * axis.sample_rate), 2 * fewest_rough)
     if np.count_nonzero(rough) >= span // 2:
-        rough &= second > limits.UNUSUAL * float(np.quantile(second, 1.0 - axis.rare))
+        rough &= second > UNUSUAL * float(np.quantile(second, 1.0 - axis.rare))
     if np.count_nonzero(rough) < span // 2:
         return np.empty(0)
     dense = np.convolve(rough, np.ones(span), "same") > span // 2
@@ -251,6 +262,7 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
 
 
 def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> Finding:
-    bursts = np.split(times, np.flatnonzero(np.diff(times) > limits.BURSTS_APART) + 1)
+    bursts_apart = 0.05  # s without an outlier ends a burst
+    bursts = np.split(times, np.flatnonzero(np.diff(times) > bursts_apart) + 1)
     where = f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{and_more(len(bursts))}"
     return axis.error(Fault.OUTLIERS, what, remedy, where)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.checks import limits
-from twin.checks.axis import READINGS, Axis
+from twin.checks.axis import PHYSICAL, READINGS, Axis
 from twin.checks.explain import fit_dynamics
 from twin.checks.report import Fault, Finding
 from twin.signals import Array
@@ -21,11 +20,12 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
     """Command, measured velocity and setpoint against the position."""
     if not axis.moves:
         return
-    allowed = max(limits.ALLOWED, limits.ALLOWED_SAMPLES / axis.sample_rate)
+    # s of lag, which a filter or a bus makes; two samples at least, where so long is fewer
+    allowed = max(3e-3, 2.0 / axis.sample_rate)
     columns = axis.log.columns
     force = axis.lag
     if abs(force) > allowed:
-        dead_time = -limits.PHYSICAL <= force < 0.0
+        dead_time = -PHYSICAL <= force < 0.0
         what, remedy = _lagging(axis, "the force", force, CAUSED, "force", "position")
         told = axis.warning if dead_time else axis.error
         yield told(Fault.LAG, what, remedy + DEAD_TIME * dead_time)
@@ -42,7 +42,8 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
         # correct, above all where a slow position loop is the cause.
         apart = abs(force) > allowed
         late = "position" if apart else " and ".join(n for n in READINGS if n in columns)
-        slow = lag > max(allowed, limits.FOLLOWING) and not axis.soft_loop
+        following = 30e-3  # s, what a slow position loop may account for
+        slow = lag > max(allowed, following) and not axis.soft_loop
         if lag < -allowed or slow:
             yield axis.warning(Fault.LAG, *_lagging(axis, "position", lag, "its setpoint", late,
                                                     "setpoint_position"))  # fmt: skip
@@ -50,12 +51,14 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
 
 def _steady(axis: Axis) -> Iterator[Finding]:
     """A lag or a drift too small to be seen at once, but the same in all parts of the log."""
+    sure_lag = 5.0  # times its error, that a lag or a drift must be
     trend = axis.trend
     if trend is None or not axis.dynamics.explains:
         return
     without, steady, drifting = trend.left
-    sure = abs(trend.drift) > max(limits.DRIFT, limits.SURE_LAG * trend.drift_error)
-    if sure and _takes_off(axis, steady, drifting, limits.TAKEN_BY_DRIFT):
+    drift = 60e-6  # s/s; two quartz clocks differ by less
+    sure = abs(trend.drift) > max(drift, sure_lag * trend.drift_error)
+    if sure and _takes_off(axis, steady, drifting, 1.0):  # of the same a drift takes off 0.2
         yield axis.warning(
             Fault.DRIFT,
             f"the force gets {abs(trend.drift) * 1e3:.2g} ms a second "
@@ -64,9 +67,13 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "record both with one clock, or import each with time stamps",
         )
         return
-    least = max(limits.STEADY_SAMPLES / axis.sample_rate, limits.STEADY)
-    sure = max(least, limits.SURE_LAG * trend.error) < abs(trend.seconds) < limits.PHYSICAL
-    if sure and _takes_off(axis, without, steady, limits.TAKEN_BY_LAG):
+    # s, what friction that the check does not know may account for
+    steady_samples = 1.5  # at least, where so long is fewer
+    least = max(steady_samples / axis.sample_rate, 0.25e-3)
+    sure = max(least, sure_lag * trend.error) < abs(trend.seconds) < PHYSICAL
+    # ripple, backlash and vibration are answered by a loop: of what is left beside the noise a lag
+    # takes off 1.7 there
+    if sure and _takes_off(axis, without, steady, 2.0):
         what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
         told = f"{what}, +- {trend.error * 1e3:.2g} ms"
         yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)
@@ -123,10 +130,11 @@ def check_units(axis: Axis) -> Iterator[Finding]:
     """Unit slips and reversed signs."""
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
-        if travel > limits.LONGEST_TRAVEL and not axis.log.kind.rotary:
+        longest_travel = 10.0  # m; farther, the unit is wrong
+        if travel > longest_travel and not axis.log.kind.rotary:
             yield axis.error(
                 Fault.UNIT,
-                f"{name} travels {travel:.4g} m, more than {limits.LONGEST_TRAVEL:g} m; "
+                f"{name} travels {travel:.4g} m, more than {longest_travel:g} m; "
                 f"in mm it would be {travel / 1e3:.4g} m",
                 "correct its unit in the import map",
             )
@@ -150,20 +158,25 @@ def _pairs(axis: Axis) -> Iterator[_Pair]:
     rates = {"velocity": ("position", axis.velocity)}
     if setpoint is not None:
         goal = smoother.position(setpoint)
+        # allowed ratios, from and to: off by more, no controller follows at all
         yield _Pair("position", smoother.position(columns["position"]), "setpoint_position", goal,
-                    limits.FOLLOWS, follows=True)  # fmt: skip
+                    (0.5, 2.0), follows=True)  # fmt: skip
         rates["setpoint_velocity"] = ("setpoint_position", smoother.velocity(setpoint))
     for name, (of, rate) in rates.items():
         if name in columns:
+            # a velocity and the rate of a position, which the low-pass rounds alike
+            same_rate = (0.95, 1.05)
             yield _Pair(name, smoother.rate(columns[name]), f"the rate of {of}", rate,
-                        limits.SAME_RATE, zero=True)  # fmt: skip
+                        same_rate, zero=True)  # fmt: skip
     if setpoint is not None and "setpoint_acceleration" in columns:
         name = "setpoint_acceleration"
+        same_second_rate = (0.9, 1.1)  # an acceleration and the second rate, whose noise is larger
         yield _Pair(name, smoother.rate(columns[name]), "the second rate of setpoint_position",
-                    smoother.acceleration(setpoint), limits.SAME_SECOND_RATE)  # fmt: skip
+                    smoother.acceleration(setpoint), same_second_rate)  # fmt: skip
     if {"force", "current"} <= set(columns) and axis.log.force_constant is not None:
+        same_force = (0.98, 1.02)  # a force and its current: one scale, with no filter between
         yield _Pair("force", columns["force"], "force constant x current",
-                    axis.log.force_constant * columns["current"], limits.SAME_FORCE)  # fmt: skip
+                    axis.log.force_constant * columns["current"], same_force)  # fmt: skip
 
 
 def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
@@ -171,7 +184,8 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     if not pair.zero:
         one, other = one - one.mean(), other - other.mean()
     power, product = float(other @ other), float(one @ other)
-    if power == 0.0 or abs(product) < limits.RELATED * np.sqrt(power * float(one @ one)):
+    related = 0.9  # correlation of two signals that state the same
+    if power == 0.0 or abs(product) < related * np.sqrt(power * float(one @ one)):
         return
     ratio = product / power
     if pair.allowed[0] <= ratio <= pair.allowed[1]:
@@ -179,7 +193,8 @@ def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
     wrong = "one of them is reversed"
     if ratio > 0.0:
         off = abs(np.log(ratio))
-        near = [text for s, text in _SLIPS.items() if abs(off - np.log(s)) < limits.LOOKS_LIKE]
+        looks_like = 0.3  # of the logarithm: how near to a known slip of units a ratio is named so
+        near = [text for s, text in _SLIPS.items() if abs(off - np.log(s)) < looks_like]
         if not near and pair.follows and axis.soft_loop:
             return
         wrong = f"it looks like {near[0]}" if near else "a scale or the sample rate is wrong"
@@ -201,7 +216,9 @@ def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
             continue
         own = min(_left(one, one), _left(other, other))
         crossed = max(_left(one, other), _left(other, one))
-        if own < limits.WORSE * crossed or crossed > limits.EXPLAINED_CROSSED:
+        worse = 1.2  # times what the motion of the other axis leaves of a force, its own leaves
+        explained_crossed = 0.6  # largest part that the motion of the other axis leaves
+        if own < worse * crossed or crossed > explained_crossed:
             continue
         what = "positions" if _follows(one, other) and _follows(other, one) else "forces"
         yield one.error(
@@ -218,7 +235,8 @@ def _explained_by(one: Axis, axes: Sequence[Axis]) -> Axis | None:
     others = [a for a in alike if len(a.force) == len(one.force)]
     if len(others) < 2:
         return next(iter(others), None)
-    rows = slice(None, None, -(-len(one.force) // limits.ROWS_OF_A_GLANCE))
+    rows_of_a_glance = 4000  # of a force, enough to tell which of many motions explains it best
+    rows = slice(None, None, -(-len(one.force) // rows_of_a_glance))
     explained = [float(np.linalg.norm(a.span(rows).T @ one.force[rows])) for a in others]
     return others[int(np.argmax(explained))]
 
@@ -236,7 +254,8 @@ def _follows(position: Axis, setpoint: Axis) -> bool:
     if told is None:
         return False
     x, r = _centred(position.log.position), _centred(told)
-    return float(x @ r) > limits.ALIKE_SETPOINT * float(np.linalg.norm(x) * np.linalg.norm(r))
+    alike_setpoint = 0.98  # correlation of a position and the setpoint that it follows
+    return float(x @ r) > alike_setpoint * float(np.linalg.norm(x) * np.linalg.norm(r))
 
 
 def _centred(x: Array) -> Array:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.checks import limits
 from twin.checks.axis import Axis, held_samples
 from twin.checks.breaks import and_more, held
 from twin.checks.report import Fault, Finding
@@ -22,7 +21,7 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     if count := held_samples(force):
         yield held(axis, "the force", count)
         return
-    least = limits.LARGE_SAMPLE * axis.force_size
+    least = 0.3 * axis.force_size  # of the command
     steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
     if steps > least and len(single := _single(off := off_course(force), least)):
         what = f"single samples of the force are off by up to {off.max():.3g} {unit}"
@@ -32,8 +31,10 @@ def check_command(axis: Axis) -> Iterator[Finding]:
     # noise that hides what the motion does not explain, even when it is averaged
     noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
     left = float(np.median(np.abs(axis.dynamics.residual)))
-    hides = axis.dynamics.explains and averaged >= limits.HIDES * left
-    if hides and averaged > limits.NOISY * float(np.std(force)):
+    # averaged noise, as a part of what the motion leaves unexplained
+    hides = axis.dynamics.explains and averaged >= 0.4 * left
+    noisy = 0.03  # averaged noise of the command, as a part of it; 1 % of its rating leaves 0.02
+    if hides and averaged > noisy * float(np.std(force)):
         yield axis.warning(
             Fault.NOISE,
             f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
@@ -49,9 +50,11 @@ def _single(off: Array, least: float) -> NDArray[np.intp]:
     if not bad.any():
         return np.flatnonzero(bad)
     # A sample at a steep edge is off by as much as its neighbours.
-    bad &= off > limits.SINGLE_SAMPLE * float(np.quantile(off, 0.99))
-    together = np.convolve(bad, np.ones(limits.NOISE_BURST), "same")
-    return np.flatnonzero(bad & (together <= limits.MOST_TOGETHER))  # noise is no single sample
+    single_sample = 60.0  # times what 99 % of the samples are off their neighbours
+    bad &= off > single_sample * float(np.quantile(off, 0.99))
+    together = np.convolve(bad, np.ones(21), "same")  # samples
+    most_together = 3  # in so many; more are a burst, and no single ones
+    return np.flatnonzero(bad & (together <= most_together))  # noise is no single sample
 
 
 def off_course(signal: Array) -> Array:
@@ -88,7 +91,9 @@ def check_saturation(axis: Axis) -> Iterator[Finding]:
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Start of the first interval at the extreme and length of all, s."""
     starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
-    stuck = lengths >= max(limits.EXTREME * axis.sample_rate, limits.EXTREME_SAMPLES)
+    # s at one value exactly
+    extreme_samples = 5  # at least, where so long is fewer
+    stuck = lengths >= max(5e-3 * axis.sample_rate, extreme_samples)
     if not stuck.any():
         return None
     return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate
@@ -98,14 +103,18 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
     """Likewise, of a low-passed command (m,): a level with steep edges at its top."""
     smoother = axis.smoother
     noise = smoother.held_noise(axis.force_noise)
-    if np.ptp(height) < limits.LIVELY_COMMAND * noise:
+    if np.ptp(height) < 200.0 * noise:  # least range of a command, times the noise
         return None
-    starts, near = _runs(height >= height.max() - limits.NEAR_LEVEL * noise)
-    wide = _runs(height >= height.max() - limits.WIDE_LEVEL * noise)[1]
+    starts, near = _runs(height >= height.max() - 10.0 * noise)  # times the noise
+    wide_level = 40.0  # the same for the edges beside the level
+    wide = _runs(height >= height.max() - wide_level * noise)[1]
     longest = int(np.argmax(near))
     inside = 0 < starts[longest] < len(height) - near[longest]
-    level = max(limits.LEVEL / smoother.block, limits.LEVEL_BLOCKS)
-    if not inside or near[longest] < level or wide.max() - near[longest] > limits.EDGE_BLOCKS:
+    # s at one value but for noise, after the low-pass
+    level_blocks = 10  # at least, where so long is fewer
+    level = max(20e-3 / smoother.block, level_blocks)
+    edge_blocks = 3  # a limited command leaves its level at once, a smooth one slowly
+    if not inside or near[longest] < level or wide.max() - near[longest] > edge_blocks:
         return None
     return smoother.time(starts[:1])[0], float(near.sum() * smoother.block)
 

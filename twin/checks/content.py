@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from twin.checks import limits
 from twin.checks.axis import READINGS, Axis
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 
@@ -37,14 +36,16 @@ def check_content(axis: Axis) -> Iterator[Finding]:
             yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
         else:
             yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
-    if axis.sample_rate < limits.SLOWEST:
+    slowest = 10.0  # Hz; no motion of an axis shows at fewer samples
+    if axis.sample_rate < slowest:
         what = (
             f"the log has {axis.sample_rate:.3g} samples a second and lasts {axis.duration:.4g} s; "
-            f"a fit needs {limits.SLOWEST:g} Hz"
+            f"a fit needs {slowest:g} Hz"
         )
         yield axis.error(Fault.UNIT, what, "correct the unit of the time, or record faster")
-    if axis.duration < limits.SHORTEST:
-        what = f"the log lasts {axis.duration:.3g} s, a fit needs {limits.SHORTEST:g} s"
+    shortest = 0.5  # s, least duration for identification
+    if axis.duration < shortest:
+        what = f"the log lasts {axis.duration:.3g} s, a fit needs {shortest:g} s"
         yield axis.error(Fault.TOO_SHORT, what, "record longer")
 
 
@@ -105,7 +106,9 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
         return
     yield from _directions(axis)
     share = axis.dynamics.inertial_share
-    if axis.dynamics.explains and share < limits.INERTIAL:
+    # share of the force, below which friction that the check does not know hides it
+    inertial = 0.005
+    if axis.dynamics.explains and share < inertial:
         mass = axis.log.kind.mass_name
         yield axis.warning(
             Fault.WEAK_EXCITATION,
@@ -115,8 +118,11 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
         )
     noise = axis.smoother.acceleration_noise(axis.position_noise)
     rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    rounded = axis.position_white < limits.ROUNDING * axis.position_step
-    if noise >= (limits.ROUNDED if rounded else limits.COARSE) * rms:
+    rounding = 1.0  # noise of rounding is at most its step
+    rounded = axis.position_white < rounding * axis.position_step
+    coarse = 0.3  # acceleration noise as a part of the acceleration
+    # the same, where it is the rounding: that is no noise and does not average out
+    if noise >= (0.05 if rounded else coarse) * rms:
         yield axis.warning(
             Fault.COARSE_POSITION,
             f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
@@ -128,10 +134,11 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
 
 def _directions(axis: Axis) -> Iterator[Finding]:
     fastest = float(np.quantile(np.abs(axis.velocity), 0.999))
-    moving = axis.velocity[np.abs(axis.velocity) > limits.CREEP * fastest]
+    creep = 0.02  # of the highest speed; slower motion counts as standstill
+    moving = axis.velocity[np.abs(axis.velocity) > creep * fastest]
     forward = float(np.mean(moving > 0.0))
     one_way = max(forward, 1.0 - forward)
-    if one_way > 1.0 - limits.ONE_WAY:
+    if one_way > 1.0 - 0.02:  # share of the moving time
         yield axis.warning(
             Fault.WEAK_EXCITATION,
             f"the axis moves only {'forwards' if forward > 0.5 else 'backwards'} "
@@ -140,7 +147,7 @@ def _directions(axis: Axis) -> Iterator[Finding]:
             "move both ways",
         )
     low, middle, high = np.quantile(np.abs(moving), (0.1, 0.5, 0.9))
-    if high - low < limits.SAME_SPEED * middle:
+    if high - low < 0.05 * middle:  # spread of the speeds as a part of their median
         yield axis.warning(
             Fault.WEAK_EXCITATION,
             f"there is one speed only, {middle:.3g} {axis.log.units['velocity']}, so that the "

@@ -9,8 +9,11 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.checks import limits
 from twin.signals import Array, between, rate, sliding_products
+
+UNUSUAL = 5.0  # times the level that 99 % of the samples stay below
+KEPT_PART = 0.2  # of a part, that moves for it to tell a lag; of moves with pauses half is rest
+WRONG_LAG = 0.03  # least residual without a lag, as a part of the signal
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,8 @@ class Smoother:
     @cached_property
     def samples(self) -> int:
         """Samples in a block."""
-        return max(round(limits.BLOCK / self.period), 1)
+        block = 1e-3  # s: what is faster is noise to an identification of friction
+        return max(round(block / self.period), 1)
 
     @property
     def block(self) -> float:
@@ -36,7 +40,10 @@ class Smoother:
     @cached_property
     def weights(self) -> Array:
         """(w,) weights (1 - r^2)^2 of the low-pass, of unit sum."""
-        count = max(round(limits.WINDOW / self.block), limits.FEWEST_BLOCKS) | 1
+        # s, full length; shorter, the noise of usual encoders hides the acceleration
+        window = 20e-3
+        fewest_blocks = 8  # in a window, so that its shape is smooth at any rate
+        count = max(round(window / self.block), fewest_blocks) | 1
         r = (2.0 * np.arange(count) - (count - 1)) / (count + 1)
         phi = (1.0 - r**2) ** 2
         return np.asarray(phi / phi.sum())
@@ -114,14 +121,14 @@ class Dynamics:
     @property
     def mass_matters(self) -> bool:
         """Whether acceleration makes a part of the command worth the name."""
-        return self.inertial_share > limits.NOTICED
+        return self.inertial_share > 0.3  # share of mass x acceleration in the command
 
 
 def contradicted(error: Array, force: Array, rare: float) -> float:
     """What an error (n,) N of a force (n,) must exceed to be unusual, which a rare part may be."""
     size = float(np.quantile(np.abs(force - np.median(force)), 0.99))
     usual = float(np.quantile(error, 1.0 - rare))
-    return max(limits.UNUSUAL * usual, limits.CONTRADICTION * size)
+    return max(UNUSUAL * usual, 0.1 * size)  # least contradiction, as a part of the command
 
 
 def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int, rare: float) -> Dynamics:
@@ -137,13 +144,15 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int, rare:
     error = np.abs(residual[use])
     if error.max(initial=0.0) > contradicted(error, force[use], rare):
         acceleration = np.abs(regressors[:, 0])
-        use &= acceleration <= limits.LEVERAGE * np.quantile(acceleration, 0.99)
-        for _ in range(limits.ROUNDS):
+        leverage = 3.0  # times the acceleration that 99 % of the samples stay below
+        use &= acceleration <= leverage * np.quantile(acceleration, 0.99)
+        for _ in range(4):  # of such a fit, after which the samples left out stay the same
             gains, residual = _squares(force, scaled, use)
             error = np.abs(residual)
-            use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - limits.TRIMMED))
+            trimmed = 0.05  # share of the samples that a fit leaves out
+            use = (kept > 0.0) & (error <= np.quantile(error[kept > 0.0], 1.0 - trimmed))
     spread = float(np.std(force[use]))
-    explains = float(np.std(residual[use])) < limits.EXPLAINED * spread
+    explains = float(np.std(residual[use])) < 0.3 * spread  # residual as a part of the command
     mass = float(gains[0] / size[0]) if size[0] > 0.0 else 0.0
     share = float(np.std(gains[0] * scaled[use, 0])) / spread if spread > 0.0 else 0.0
     return Dynamics(mass, explains, share, residual, first)
@@ -165,18 +174,25 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> t
     total, left = _left_at(signal, explained_by, kept, block)
     samples, reach = _least_lag(total, left), len(left) // 2
     best = reach + round(samples)
+    clear_lag = 0.5  # largest residual at the best lag, as a part of the signal
+    better_lag = 0.6  # largest residual at the best lag, as a part of that without a lag
+    # lags beyond that part of a period are told from none by the harmonics alone
+    of_a_period = 0.125
     clear = (
-        left[best] < limits.CLEAR_LAG**2 * total[best]
-        and left[reach] > limits.WRONG_LAG**2 * total[reach]
-        and left[best] < limits.BETTER_LAG**2 * left[reach]
-        and abs(samples) <= limits.OF_A_PERIOD * _period(signal - signal.mean())
+        left[best] < clear_lag**2 * total[best]
+        and left[reach] > WRONG_LAG**2 * total[reach]
+        and left[best] < better_lag**2 * left[reach]
+        and abs(samples) <= of_a_period * _period(signal - signal.mean())
     )
     return samples * block, bool(clear)
 
 
 def _left_at(signal: Array, explained_by: Array, kept: Array, block: float) -> tuple[Array, Array]:
     """Power (2 r + 1,) of a signal at each lag from -r to r blocks, and what is left of it."""
-    reach = min(round(limits.LONGEST_LAG / block), len(signal) // limits.MOTION_OVER_LAG)
+    longest_lag = 0.25  # s, searched both ways
+    # least length of the log over the longest lag, so that it holds several moves
+    motion_over_lag = 20
+    reach = min(round(longest_lag / block), len(signal) // motion_over_lag)
     inner = slice(reach, len(signal) - reach)
     columns = explained_by[inner] * kept[inner, None]
     length = np.linalg.norm(columns, axis=0)
@@ -192,7 +208,8 @@ def _least_lag(total: Array, left: Array) -> float:
     """The least lag, in blocks, at which as little is left as anywhere; 0 where there is none."""
     dips, fraction, bottom = _dips(left)
     least = min(bottom.min(initial=np.inf), left.min())  # the latter where it falls to an end
-    good = (bottom <= limits.AS_GOOD_LAG**2 * least) | (bottom <= limits.WRONG_LAG**2 * total[dips])
+    as_good_lag = 1.5  # times the least residual: lags up to it count as equally good
+    good = (bottom <= as_good_lag**2 * least) | (bottom <= WRONG_LAG**2 * total[dips])
     if not good.any():
         return 0.0
     lags = dips[good] - len(left) // 2
@@ -226,11 +243,11 @@ class Trend:
 
 def find_trend(signal: Array, explained_by: Array, kept: Array, block: float) -> Trend | None:
     """The lag in each part of a log; None where too few parts tell one."""
-    edges = np.linspace(0, len(signal), limits.LAG_PARTS + 1).astype(int)
-    lively = limits.LIVELY_PART * np.ptp(signal)
+    edges = np.linspace(0, len(signal), 8 + 1).astype(int)  # of a log, each with a lag of its own
+    lively = 0.04 * np.ptp(signal)  # least range of a part, of that of the whole
     every = [slice(first, last) for first, last in pairwise(edges)]
-    parts = [p for p in every if kept[p].mean() > limits.KEPT_PART and np.ptp(signal[p]) > lively]
-    if len(parts) < limits.FEWEST_LAG_PARTS:
+    parts = [p for p in every if kept[p].mean() > KEPT_PART and np.ptp(signal[p]) > lively]
+    if len(parts) < 5:  # lively ones, of which a median is worth the name
         return None
     curves = [_left_at(signal[p], explained_by[p], kept[p], block) for p in parts]
     lags = block * np.array([_least_lag(total, left) for total, left in curves])
@@ -273,5 +290,6 @@ def _period(signal: Array) -> float:
     overlap = np.sqrt((power[len(signal) - lags]) * (power[-1] - power[lags]))
     alike = total / np.maximum(overlap, np.finfo(float).tiny)
     apart = np.logical_or.accumulate(alike < 0.0)  # from where it is another for the first time
-    again = np.flatnonzero(apart & (alike > limits.REPEATS))
+    repeats = 0.7  # least correlation of a signal with itself a period later
+    again = np.flatnonzero(apart & (alike > repeats))
     return float(again[0]) if len(again) else float("inf")

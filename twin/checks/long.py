@@ -19,7 +19,6 @@ OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not
 LARGEST_PART = 2_500_000
 # A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.
 MOST_SAMPLES = 7_500_000
-LONGEST_STEP = 5e-4  # s: two in a block of motion; with one the residual is half as large again
 OWN = ("sample_rate_hz", "axes", "schema_version")  # metadata that are told as something else
 
 
@@ -115,7 +114,8 @@ def _thinned(parts: Iterable[Log], every: int) -> Iterator[Log]:
     """The parts at a lower rate; what does not fill a step at the end of one goes to the next."""
     coming = iter(parts)
     first = next(coming)
-    step = max(1, min(every, int(LONGEST_STEP * first.sample_rate * (1.0 + 1e-9))))
+    longest_step = 5e-4  # s: two in a block of motion; with one the residual is half as large again
+    step = max(1, min(every, int(longest_step * first.sample_rate * (1.0 + 1e-9))))
     return (thinned(part, step) for part in in_multiples(chain([first], coming), step))
 
 
