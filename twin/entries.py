@@ -17,9 +17,7 @@ from pydantic.fields import FieldInfo
 
 from twin.errors import InputError, at
 
-MOST_BYTES = 5_000_000  # of a TOML file
 NAME_OF_TABLE = "[key]"  # where the library found fault with the name and not what it names
-LONGEST_VALUE = 60  # characters of it in a message
 
 
 class Entries(BaseModel):
@@ -54,10 +52,11 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def toml_document(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of a TOML file and its document; raises InputError where it is none."""
+    most_bytes = 5_000_000  # of a TOML file
     with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise InputError(f"is larger than {MOST_BYTES // 10**6} MB; give a TOML file")
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise InputError(f"is larger than {most_bytes // 10**6} MB; give a TOML file")
     try:
         text = content.decode()
         return text, tomllib.loads(text)
@@ -71,7 +70,8 @@ def shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):
         text = "something too large to be shown"
-    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
+    longest_value = 60  # characters of it in a message
+    return text if len(text) <= longest_value else f"{text[:longest_value]}..."
 
 
 def _sentence(kind: type[Entries], document: Any, error: str, place: tuple[str | int, ...]) -> str:

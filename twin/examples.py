@@ -12,7 +12,6 @@ from twin.errors import InputError
 from twin.files import make_folder, write_atomically
 
 SECONDS = 10.0  # of each log
-RECORDED = 2000.0  # Hz, of the recording as CSV
 RECORDING_MAP = """\
 # Map of recording.csv: what each column is, in which unit
 time = {column = "t [s]", unit = "s"}
@@ -81,7 +80,8 @@ def _recording(folder: Path) -> None:
     from twin.experiments.named import simulate
     from twin.model.file import load_model
 
-    machine = replace(load_model("example_machine"), sample_rate=RECORDED)
+    recorded = 2000.0  # Hz, of the recording as CSV
+    machine = replace(load_model("example_machine"), sample_rate=recorded)
     log = simulate(machine, "tracking", seed=1, duration=SECONDS)
     x, y = log.axes["x"].columns, log.axes["y"].columns
     rows = zip(log.time, 1e3 * x["position"], x["current"], 1e3 * y["position"], strict=True)

@@ -20,9 +20,6 @@ from twin.signals import Array
 
 # N, tried to see whether an actuation is a straight line of the command
 FORCES = tuple(sign * 10.0**k for k in range(-6, 7) for sign in (1.0, -1.0))
-RAMPS = (0.1, 100.0)  # N/s, slopes of commands that tell how late a force is
-RAMP_PERIOD, RAMP_SAMPLES = 1e-3, 2000  # s: over the longest lag of the catalogue ten times
-ROUNDS = 12  # of a friction that depends on the force it is part of, by that of the sample before
 
 
 @dataclass(frozen=True)
@@ -96,14 +93,15 @@ def _late_by(law: Law, values: tuple[float, ...], n_states: int) -> float | None
 
     From ramps of commands: one that is late trails them by its time, whatever their slope.
     """
+    ramp_period, ramp_samples = 1e-3, 2000  # s: over the longest lag of the catalogue ten times
     trailing = []
-    for slope in RAMPS:
+    for slope in (0.1, 100.0):  # N/s, slopes of commands that tell how late a force is
         states, io = [0.0] * n_states, [0.0] * IO_SIZE
-        io[DT] = RAMP_PERIOD
-        for k in range(RAMP_SAMPLES):
+        io[DT] = ramp_period
+        for k in range(ramp_samples):
             io[INDEX], io[TIME], io[X], io[U] = k, k * io[DT], 0.1, slope * k * io[DT]
             law(values, states, io)
-            if k in (RAMP_SAMPLES // 2, RAMP_SAMPLES - 1):
+            if k in (ramp_samples // 2, ramp_samples - 1):
                 trailing.append(k * io[DT] - io[U] / slope)
     same = np.ptp(trailing) <= 0.01 * abs(trailing[0])
     return trailing[-1] if same and trailing[0] > 0.0 else None
@@ -126,7 +124,9 @@ def feedforward(axis: AxisModel, motion: Array, others: Array, period: float) ->
     # What friction has to hold at rest is the command less the forces, so these come first.
     needed = inertia - force(_having(kept, lambda kind: kind is Kind.FORCE), inertia)
     command = needed
-    for _ in range(ROUNDS if any(f.effect.reads("U") for f in moving.effects) else 0):
+    # of a friction that depends on the force it is part of, by that of the sample before
+    rounds = 12
+    for _ in range(rounds if any(f.effect.reads("U") for f in moving.effects) else 0):
         drag = needed - inertia + force(moving, command)
         command = needed - np.concatenate([[0.0], drag[:-1]])
     wanted = inertia - force(moving, command)

@@ -11,8 +11,6 @@ from twin.model.machine import MachineModel
 
 Array = NDArray[np.float64]
 
-HUGE = 1e10  # beyond it MuJoCo calls a state bad as well
-
 
 def require_sound(
     signals: Array, forces: Array, model: MachineModel, table: Table, first: int = 0
@@ -58,4 +56,5 @@ def _culprit(forces: Array, model: MachineModel, table: Table, axis: str) -> str
 
 
 def _bad(values: Array) -> NDArray[np.bool_]:
-    return ~(np.abs(values) <= HUGE)  # not (nan <= HUGE)
+    huge = 1e10  # beyond it MuJoCo calls a state bad as well
+    return ~(np.abs(values) <= huge)  # not (nan <= HUGE)

@@ -202,15 +202,13 @@ def pitches_to_try(
 
 # --- memory of the direction, and of past samples -------------------------------------------------
 
-TURNED = 1e-12  # less of a turn than this is left when it is over
-
 
 def turned(s, io, reach):
     """The direction of motion as it follows a reversal within ``reach`` m; steps state 0."""
     direction = s[0]
     if io[V] != 0.0:
         change = copysign(1.0, io[V]) - s[0]
-        if abs(change) > TURNED:
+        if abs(change) > 1e-12:  # less of a turn than this is left when it is over
             change *= -expm1(-abs(io[V]) * io[DT] / reach)
         direction += io[WHEN] * change
         s[0] += change

@@ -5,9 +5,7 @@ from __future__ import annotations
 import ctypes
 from contextlib import suppress
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # malloc.h of glibc
 SMALLEST_MAPPED = 1 << 23  # bytes; a signal of a log is smaller, an array of several is not
-MOST_KEPT = 1 << 25  # bytes at the end of that place
 
 
 def share_one_arena() -> None:
@@ -16,11 +14,13 @@ def share_one_arena() -> None:
     It would keep what each of them has freed for that thread alone, and take the next signal from
     the system again, which clears that memory first.
     """
+    m_trim_threshold, m_mmap_threshold, m_arena_max = -1, -3, -8  # malloc.h of glibc
     with suppress(OSError, AttributeError, TypeError):
         libc = ctypes.CDLL(None)
-        libc.mallopt(M_ARENA_MAX, 1)
-        libc.mallopt(M_MMAP_THRESHOLD, SMALLEST_MAPPED)
-        libc.mallopt(M_TRIM_THRESHOLD, MOST_KEPT)
+        libc.mallopt(m_arena_max, 1)
+        libc.mallopt(m_mmap_threshold, SMALLEST_MAPPED)
+        most_kept = 1 << 25  # bytes at the end of that place
+        libc.mallopt(m_trim_threshold, most_kept)
 
 
 def trim_memory() -> None:

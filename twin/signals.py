@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 MANY = 20_000  # values from which on their median is sought between two of a sample
-SAMPLE = 1000  # values of that sample, of whose ranks 0.45 to 0.55 hold the median by 3 sigma
-
-_MEDIAN = 0.6745  # of the size of Gaussian noise, over its RMS
 
 
 def between(signal: Array, period: float) -> Array:
@@ -90,7 +87,7 @@ def _local_fit(samples: int, order: int, derivative: int) -> Array:
 
 def usual_size(noise: Array) -> float:
     """RMS of Gaussian noise (n,) by the median of its size, which outliers do not move."""
-    return median(np.abs(noise)) / _MEDIAN
+    return median(np.abs(noise)) / 0.6745  # of the size of Gaussian noise, over its RMS
 
 
 def median(values: Array) -> float:
@@ -100,7 +97,8 @@ def median(values: Array) -> float:
     """
     if len(values) < MANY or np.isnan(values.max()):
         return float(np.median(values))
-    sample = np.sort(values[:: len(values) // SAMPLE])
+    # values of that sample, of whose ranks 0.45 to 0.55 hold the median by 3 sigma
+    sample = np.sort(values[:: len(values) // 1000])
     low, high = sample[int(0.45 * len(sample))], sample[int(0.55 * len(sample))]
     within = values[(values >= low) & (values <= high)]
     middle = np.array([(len(values) - 1) // 2, len(values) // 2]) - np.count_nonzero(values < low)

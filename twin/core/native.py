@@ -162,7 +162,6 @@ def slope(values, k, dt):
 
 # States every axis has before those of its effects.
 LAST_FRICTION, LAST_VELOCITY, LAST_ACCELERATION, LAST_NET = range(4)
-AXIS_STATES = 4
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
@@ -268,7 +267,7 @@ def build_table(
     n_states = 0
     for axis, effects in axes.items():
         state_at = n_states
-        n_states += AXIS_STATES
+        n_states += 4  # of the axis itself, before those of its effects
         begin = len(rows)
         sensing = begin
         for effect, values in sorted(effects, key=lambda e: e[0].kind.value):

@@ -44,7 +44,6 @@ RESULT = {
 }
 SPEEDS = (0.0, 0.1, 1e-6, -1e-6, -0.1, 0.0)  # m/s, one sample each
 PERIOD = 1e-4  # s
-MOTIONS = 1000  # samples of any motion, for the indices alone
 
 
 class Outside(Exception):
@@ -128,7 +127,7 @@ def _at_speed(speed: float) -> list[float]:
 def _anywhere() -> Iterator[list[float]]:
     """io along motions of all sizes, both ways."""
     rng = random.Random(1)
-    for k in range(MOTIONS):
+    for k in range(1000):  # samples of any motion, for the indices alone
         size = 10.0 ** rng.uniform(-6.0, 1.0)
         io = [rng.choice((-1.0, 1.0)) * size * rng.random() for _ in range(IO_SIZE)]
         io[DT], io[MASS], io[MOVED], io[WHEN] = PERIOD, 1.0, 1.0, 1.0

@@ -19,7 +19,6 @@ from twin.curve import Part
 from twin.effect import DT, LEAST, MOST, OUT, WHEN, Effect, Kind, Parameter, V, X
 from twin.law_parts import COVERED_MOTION
 
-OWN = 6  # where the coefficients begin
 CROSS = 24
 SPEEDS = 4  # powers of speed, from 0
 
@@ -47,7 +46,7 @@ def law(p, s, io):
     speed = min(max(io[V] / p[2], -1.0), 1.0)
     short = remembered(s, 0, io, p[3])
     long = remembered(s, 1, io, p[4])
-    at, force, now, following = OWN, 0.0, 1.0, speed
+    at, force, now, following = 6, 0.0, 1.0, speed  # where the coefficients begin
     for j in range(SPEEDS):
         for a in range(2):
             for b in range(2):

@@ -21,7 +21,6 @@ from twin.law_parts import (
 )
 
 GONE = 40.0  # exp(-40) is below the rounding of what it is added to
-SHORT = 0.05  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
 
 
 def law(p, s, io):
@@ -37,7 +36,7 @@ def law(p, s, io):
         io[OUT] = viscous * io[VISCOUS] * v
         return
     a = speed * (sigma0 * io[DT] / level)
-    if a < SHORT:
+    if a < 0.05:  # below it the series of 1 - exp(-a) to a^8 is exact to rounding
         b = a * a
         sinh = a * (1.0 + b * (1 / 6 + b * (1 / 120 + b * (1 / 5040))))
         grown = sinh - b * (1 / 2 + b * (1 / 24 + b * (1 / 720 + b * (1 / 40320))))

@@ -38,7 +38,6 @@ from twin.law_parts import (
 
 SHARES = 11  # where the elements' own parameters begin
 FULL = 1.0 - 1e-12  # part of a limit, or of a gap, that counts as all of it
-NEAR = 1e-7  # gap below which its slope is that at its end
 
 
 def deflect(p, s, count, share, spring, ratio, step):
@@ -68,7 +67,7 @@ def sticking(p, s, count, share, spring, ratio, way):
 def slope(gap, m):
     """(1 - sgn(r)|r|^m)/(1 - r) with 1 - r = gap."""
     r = min(max(1.0 - gap, -1e3), 1e3)
-    if abs(gap) < NEAR:
+    if abs(gap) < 1e-7:  # gap below which its slope is that at its end
         return m
     return (1.0 - r**m if r > 0.0 else 1.0 + (-r) ** m) / gap
 

@@ -26,8 +26,6 @@ from twin.experiments.trajectory import (
 from twin.model.machine import MachineModel
 from twin.model.units import rotary_unit
 
-TURN_REST = 0.1  # s of rest of the other axis at each end, as of moves by default
-
 
 def given(unit: str, meaning: str, default: Any = MISSING, *, zero: bool = False) -> Any:
     """A parameter with its unit; positive, or where ``zero`` also zero."""
@@ -155,7 +153,8 @@ def _with_other(alone: AnySetpoint, driven: Driven, span: float) -> Setpoint:
     index = 1 - driven.index
     ends = np.tile(driven.place, (4, 1))
     ends[1:3, index] += 0.5 * span, -0.5 * span
-    cycle = point_to_point(machine_limits(model), ends, TURN_REST, model.sample_rate)
+    turn_rest = 0.1  # s of rest of the other axis at each end, as of moves by default
+    cycle = point_to_point(machine_limits(model), ends, turn_rest, model.sample_rate)
     count = len(alone) // len(cycle)
     if count == 0:
         raise CannotRun(

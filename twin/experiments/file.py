@@ -27,10 +27,6 @@ from twin.numbers import is_number
 
 SUFFIX = ".toml"
 ENDING = ".setpoints.csv"
-ROWS = 100_000  # of a CSV, made at once: some 10 MB
-POINTS = 0.01  # s, between the points of a trajectory, which a controller joins by smooth curves
-CYCLE = 1e-3  # s, of the PLC task that takes a point each cycle
-A_LINE = 8  # values of an array
 
 
 def format_experiment(experiment: Experiment, *comments: str, units: AxisUnits = LINEAR) -> str:
@@ -157,8 +153,9 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
         names += [f"{name} force [{u.force}]"] if i in driven else []
     with atomic_writer(path) as stream:
         stream.write((",".join(names) + "\n").encode())
-        for first in range(0, len(setpoint), ROWS):
-            part = setpoint.part(first, min(first + ROWS, len(setpoint)))
+        rows = 100_000  # of a CSV, made at once: some 10 MB
+        for first in range(0, len(setpoint), rows):
+            part = setpoint.part(first, min(first + rows, len(setpoint)))
             columns = [np.arange(first, first + len(part)) / part.sample_rate]
             for i in range(len(model.axes)):
                 own = part.columns if i in driven else part.columns[:3]
@@ -169,7 +166,9 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
 def _trajectory(setpoint: Setpoint, model: MachineModel) -> str:
     """The message as YAML, a point a line."""
     lines = []
-    for k in _points(setpoint, POINTS):
+    # s, between the points of a trajectory, which a controller joins by smooth curves
+    points = 0.01
+    for k in _points(setpoint, points):
         named = zip(("positions", "velocities", "accelerations"), setpoint.columns, strict=False)
         values = (f"{name}: [{', '.join(f'{v:.9f}' for v in x[k])}]" for name, x in named)
         seconds, rest = divmod(round(1e9 * k / setpoint.sample_rate), 10**9)
@@ -181,7 +180,7 @@ def _trajectory(setpoint: Setpoint, model: MachineModel) -> str:
 
 def _structured_text(setpoint: Setpoint, model: MachineModel) -> str:
     """A list of global variables, and in a comment how a task feeds it (Beckhoff, Tc2_MC2)."""
-    points = _points(setpoint, CYCLE)
+    points = _points(setpoint, 1e-3)  # s, of the PLC task that takes a point each cycle
     cycle, last = (points[1] - points[0]) / setpoint.sample_rate, len(points) - 1
     names = axis_identifiers(model)
     feeds = [
@@ -208,7 +207,8 @@ def _structured_text(setpoint: Setpoint, model: MachineModel) -> str:
 
 
 def _array(name: str, kind: str, values: list[str], unit: str) -> list[str]:
-    rows = [", ".join(values[k : k + A_LINE]) for k in range(0, len(values), A_LINE)]
+    a_line = 8  # values of an array
+    rows = [", ".join(values[k : k + a_line]) for k in range(0, len(values), a_line)]
     head = f"    {name} : ARRAY[0..{len(values) - 1}] OF {kind} := [ (* {unit} *)"
     return [head, *(f"        {row}," for row in rows[:-1]), f"        {rows[-1]}];"]
 

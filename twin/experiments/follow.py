@@ -24,8 +24,6 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array, rate
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run_parts
 
-DRAWN = 1 << 16  # numbers drawn at once, to be thrown away
-
 
 def follow_parts(
     model: MachineModel,
@@ -69,8 +67,9 @@ def _one_after_the_other(rng: Generator, count: int, samples: int) -> list[Gener
     out = []
     for _ in range(count):
         out.append(deepcopy(rng))
-        for first in range(0, samples, DRAWN):
-            rng.standard_normal(min(DRAWN, samples - first))
+        drawn = 1 << 16  # numbers drawn at once, to be thrown away
+        for first in range(0, samples, drawn):
+            rng.standard_normal(min(drawn, samples - first))
     return out
 
 

@@ -43,11 +43,6 @@ from twin.experiments.trajectory import (
 )
 from twin.model.machine import AxisModel, MachineModel
 
-RANDOM_ENDS = (0.02, 0.98)  # parts of the travel between which random places lie
-CRUISE = 1.0  # s, about the longest time at one speed of tracking; it bounds slow moves
-LONGEST_PAUSE = 0.2  # s, of tracking
-CLOSING_REST = 0.05  # s at the end of tracking, too short for another move
-
 
 @dataclass(frozen=True)
 class Tracking(Experiment):
@@ -78,15 +73,16 @@ class Tracking(Experiment):
         low, high = travel_box(limits)
         left, place = (samples - 1) / rate, np.mean((low, high), axis=0)
         parts: list[Phases] = []
-        while left > CLOSING_REST:
+        while left > 0.05:  # s at the end of tracking, too short for another move
             drawn = self._drawn(limits, rng)
-            reach = CRUISE * np.array([axis.velocity for axis in drawn])
+            cruise = 1.0  # s, about the longest time at one speed of tracking; it bounds slow moves
+            reach = cruise * np.array([axis.velocity for axis in drawn])
             near, far = np.maximum(low, place - reach), np.minimum(high, place + reach)
             target = near + (far - near) * rng.beta(0.5, 0.5, place.size)
             while (step := move(drawn, place, target)).total > left:
                 target = (place + target) / 2.0
             # At least one sample, so that the loop ends whatever is drawn.
-            pause = rest(target, max(LONGEST_PAUSE * rng.uniform(-1.0, 1.0), 1.0 / rate))
+            pause = rest(target, max(0.2 * rng.uniform(-1.0, 1.0), 1.0 / rate))  # s, of tracking
             parts += [step, pause]
             left -= step.total + pause.total
             place = target
@@ -114,7 +110,8 @@ class Moves(Experiment):
     def setpoint(self, model: MachineModel, rng: np.random.Generator) -> AnySetpoint:
         limits = machine_limits(model)
         low, high = travel_box(limits)
-        places = low + (high - low) * rng.uniform(*RANDOM_ENDS, (self.count, len(limits)))
+        random_ends = (0.02, 0.98)  # parts of the travel between which random places lie
+        places = low + (high - low) * rng.uniform(*random_ends, (self.count, len(limits)))
         if not self.duration:
             return point_to_point(limits, places, self.dwell, model.sample_rate)
         total, count = self.dwell, 1

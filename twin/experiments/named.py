@@ -39,13 +39,7 @@ from twin.numbers import neat, require_seed
 from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
-MAP_SPAN = 0.02  # m
-PASS_SPEED = 0.1  # m/s
-PASS_PART = 0.88  # of the travel
 DURATION = 20.0  # s
-REST = 0.1  # s between moves
-LEAST_DWELL = 0.02  # s, to which rests are shortened where the moves need the time
-MOST_HALVINGS = 10  # of the plateaus of a staircase
 ALLOWED = 0.05  # part of what was asked by which the length may be off
 
 Kind = TypeVar("Kind", bound=Experiment)
@@ -91,7 +85,7 @@ def _fitted(draft: Any, seconds: float, length: Length) -> Any:
         while length(draft) > seconds and len(draft.efforts) > 1:
             draft = replace(draft, efforts=draft.efforts[:-1])
     if isinstance(draft, Staircase):
-        for _ in range(MOST_HALVINGS):
+        for _ in range(10):  # of the plateaus of a staircase
             if length(draft) <= seconds:
                 break
             draft = replace(draft, longest_plateau=neat(0.5 * draft.longest_plateau))
@@ -109,7 +103,8 @@ def _filled(draft: Any, seconds: float, length: Length) -> Any:
         return draft
     longer = length(replace(draft, dwell=draft.dwell + 1.0)) - now  # s for each s of rest
     dwell = draft.dwell + (seconds - now) / longer
-    return replace(draft, dwell=neat(max(dwell, min(LEAST_DWELL, draft.dwell or LEAST_DWELL))))
+    least_dwell = 0.02  # s, to which rests are shortened where the moves need the time
+    return replace(draft, dwell=neat(max(dwell, min(least_dwell, draft.dwell or least_dwell))))
 
 
 @dataclass(frozen=True)
@@ -125,22 +120,23 @@ def _limit(model: MachineModel, axis: str) -> Limits:
 
 
 def _moves(model: MachineModel, axis: str, duration: float) -> Experiment:
-    return Moves(count=max(int(duration / REST), 2), duration=duration)
+    return Moves(count=max(int(duration / 0.1), 2), duration=duration)  # s between moves
 
 
 def _cable_pass(model: MachineModel, axis: str, duration: float) -> Experiment:
     limit = _limit(model, axis)
     low, high = limit.travel
-    span = PASS_PART * (high - low)
-    speed = min(PASS_SPEED, limit.fastest_plateau(span))
+    span = 0.88 * (high - low)  # of the travel
+    speed = min(0.1, limit.fastest_plateau(span))  # m/s
     return lasting(Passes(axis, span=span, speed=speed, repeats=1), model, duration)
 
 
 def _velocity_map(model: MachineModel, axis: str, duration: float) -> Experiment:
-    fastest = _limit(model, axis).fastest_plateau(MAP_SPAN)
+    map_span = 0.02  # m
+    fastest = _limit(model, axis).fastest_plateau(map_span)
     speeds = tuple(s for s in MAP_SPEEDS if s <= fastest)
     longest = duration / 4.0 / len(speeds)
-    draft = Staircase(axis, speeds=speeds, span=MAP_SPAN, longest_plateau=longest)
+    draft = Staircase(axis, speeds=speeds, span=map_span, longest_plateau=longest)
     return lasting(draft, model, duration)
 
 

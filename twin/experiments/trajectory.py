@@ -28,8 +28,6 @@ from twin.model.units import LINEAR, AxisUnits
 
 FloatArray = npt.NDArray[np.float64]
 
-SAME_PLACE = 1e-9  # m, rounding of a position that lies on the end of the travel
-MOST_SAMPLES = 36_000_000  # one hour at 10 kHz, the rate of the thesis's stage
 BLOCK = 16_384  # samples worked on at once: the temporary arrays stay in the cache
 
 
@@ -111,7 +109,8 @@ def inside_travel(limits: Sequence[Limits], positions: FloatArray) -> FloatArray
     A position outside by rounding alone is set to the end of the travel.
     """
     low, high = travel_box(limits)
-    outside = np.argwhere((positions < low - SAME_PLACE) | (positions > high + SAME_PLACE))
+    same_place = 1e-9  # m, rounding of a position that lies on the end of the travel
+    outside = np.argwhere((positions < low - same_place) | (positions > high + same_place))
     if outside.size:
         where = tuple(outside[0])
         axis = limits[where[-1]]
@@ -129,10 +128,11 @@ def require_length(duration: float, sample_rate: float) -> None:
     if not (math.isfinite(duration) and duration > 0.0):
         raise InputError(f"duration {duration:g} s is not allowed: give a number above 0 s")
     samples = duration * sample_rate
-    if samples < 1.0 - 1e-9 or samples > MOST_SAMPLES:
+    most_samples = 36_000_000  # one hour at 10 kHz, the rate of the thesis's stage
+    if samples < 1.0 - 1e-9 or samples > most_samples:
         raise CannotRun(
             f"duration {duration:g} s at {sample_rate:g} Hz is {samples:g} samples, allowed are "
-            f"1 to {MOST_SAMPLES}: change the duration, the repeats or the sample rate"
+            f"1 to {most_samples}: change the duration, the repeats or the sample rate"
         )
 
 

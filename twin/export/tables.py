@@ -23,11 +23,7 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
 
-PLACES = 1025  # along the travel: a bump a hundredth of it wide has ten
-SPEEDS = 61  # from zero on, denser at low speed, where friction bends
 ENTRIES = 256  # of one period
-FEW = 33  # places that tell the mean over the travel at each speed
-RUN_IN = 0.25  # of the travel, run on the spot for friction to forget how it began
 EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses where no log is given
 
 
@@ -121,12 +117,13 @@ def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTab
         and not f.effect.reads("TIME")
     ]  # fmt: skip
     passed = replace(axis, effects=tuple(f for f in shown if not _repeats(f)))
-    positions = np.linspace(*reach, PLACES)
-    speeds = speed * np.linspace(0.0, 1.0, SPEEDS) ** 2
+    positions = np.linspace(*reach, 1025)  # along the travel: a bump a hundredth of it wide has ten
+    # from zero on, denser at low speed, where friction bends
+    speeds = speed * np.linspace(0.0, 1.0, 61) ** 2
     runs = np.maximum(speeds, 1e-6 * speed)
     usual = speed / 9.0
     along = 0.5 * (_pass(passed, positions, usual) + _pass(passed, positions, -usual))
-    few = np.linspace(*reach, FEW)
+    few = np.linspace(*reach, 33)  # places that tell the mean over the travel at each speed
     own = np.interp(few, positions, along)
     forwards, backwards = (
         np.array([np.mean(_pass(passed, few, way * v) - own) for v in runs]) for way in (1.0, -1.0)
@@ -147,7 +144,8 @@ def _repeats(fitted: Fitted) -> bool:
 def _pass(axis: AxisModel, positions: Array, velocity: float) -> Array:
     """Force (n,) N at these positions of a pass at a velocity, m/s."""
     along = positions if velocity > 0.0 else positions[::-1]
-    run_in = round(RUN_IN * len(along))
+    # of the travel, run on the spot for friction to forget how it began
+    run_in = round(0.25 * len(along))
     x = np.concatenate([np.full(run_in, along[0]), along])
     motion = np.stack([x, np.full_like(x, velocity), np.zeros_like(x)])
     period = (positions[1] - positions[0]) / abs(velocity)

@@ -14,9 +14,6 @@ from twin.logs.log import Array
 from twin.logs.series import instant
 from twin.numbers import first_not_finite
 
-JITTER = 0.01  # of a period: how far a time may be off the even grid
-LONGEST_GAP = 20.0  # usual steps, over which a line is no measurement
-
 
 def rate_of(time: Array) -> float:
     """Sample rate in Hz of times (n,) in s.
@@ -24,18 +21,19 @@ def rate_of(time: Array) -> float:
     It is the nearest whole number where the times allow that. Raises InputError that names row and
     time where they do not increase, have a gap, or are off the even grid by more than 1 %.
     """
+    jitter = 0.01  # of a period: how far a time may be off the even grid
     _require_finite(time)
     elapsed = time - time[0]
     steps = np.diff(elapsed)
     period = float(np.median(steps))
     rate = len(steps) / max(float(elapsed[-1]), 1e-9)  # less than none is refused below
-    if abs(round(rate) / rate - 1.0) * len(steps) < JITTER:
+    if abs(round(rate) / rate - 1.0) * len(steps) < jitter:
         rate = float(round(rate))
     off = np.abs(elapsed * rate - np.arange(len(time)))
     for fault, wrong in (
         ("does not increase", np.append(False, steps <= 0.0)),
         ("has a gap", np.append(False, steps > 1.5 * period)),
-        (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > JITTER),
+        (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > jitter),
     ):
         if wrong.any():
             _require_no_hole(time)  # which a clock would not mend
@@ -57,7 +55,8 @@ def _require_finite(time: Array) -> None:
 def _require_no_hole(time: Array) -> None:
     steps = np.diff(time)
     gap = int(np.argmax(steps))
-    if steps[gap] > LONGEST_GAP * float(np.median(steps)) > 0.0:
+    longest_gap = 20.0  # usual steps, over which a line is no measurement
+    if steps[gap] > longest_gap * float(np.median(steps)) > 0.0:
         raise InputError(
             f"there is nothing between {instant(time[gap])} and {instant(time[gap + 1])}; import "
             "the parts before and behind it as logs of their own"

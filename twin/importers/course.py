@@ -12,12 +12,7 @@ from twin.logs.log import Array
 from twin.signals import between, rate
 
 _SPAN = 0.01  # s over which a rate is taken
-_LONG = 0.1  # s over which one is compared with a column called so: a filter's lag is less, and so
-# is the share of the noise of a coarse encoder
 RATE = 0.9  # correlation of a column with the rate of another from which it is called that
-_FORCE = 0.3  # of the variance of a command that motion explains
-_FOLLOWS = 0.95  # correlation of a signal and its setpoint, at the lag of the loop
-_LOOP = 0.25  # s, largest lag of a loop that is followed at all
 
 Columns = Mapping[str, Array]
 Pair = tuple[str, str, float]  # a position, its rate, and their correlation
@@ -53,7 +48,8 @@ def leaders(columns: Columns, names: Sequence[str], signal: Array, step: float) 
     by friction, with the sign of the velocity. That of a spring does, but in another size.
     """
     span = _width(step) * step
-    reach = min(round(_LOOP / span), len(signal) // 4)
+    loop = 0.25  # s, largest lag of a loop that is followed at all
+    reach = min(round(loop / span), len(signal) // 4)
     found = []
     for name in names:
         other = means(columns[name], step)
@@ -61,7 +57,7 @@ def leaders(columns: Columns, names: Sequence[str], signal: Array, step: float) 
         own, lags = signal[reach:count], range(-reach, reach + 1)
         shifts = [(correlation(own, other[reach - k : count - k]), k) for k in lags]
         likeness, ahead = max(shifts)
-        if likeness > _FOLLOWS:
+        if likeness > 0.95:  # correlation of a signal and its setpoint, at the lag of the loop
             slope = float(np.std(other) / np.std(signal))
             found.append(Leader(name, likeness, ahead * span, slope))
     return sorted(found, key=lambda leader: -leader.likeness)
@@ -81,12 +77,16 @@ def moved_by(
         left = force - rows @ np.linalg.lstsq(rows, force, rcond=1e-10)[0]
         found.append((1.0 - float(np.var(left) / np.var(force)), name))
     share, best = max(found, default=(0.0, ""))
-    return (best, share) if share > _FORCE else None
+    # of the variance of a command that motion explains
+    return (best, share) if share > 0.3 else None
 
 
 def likeness_to_rate(position: Array, velocity: Array, step: float) -> float:
     """Of two columns (n,): how well the one goes with the rate of the other, 0 to 1."""
-    span = min(_LONG, 0.05 * len(position) * step)  # 20 of a short log
+    # s over which one is compared with a column called so: a filter's lag is less, and so is the
+    # share of the noise of a coarse encoder
+    long = 0.1
+    span = min(long, 0.05 * len(position) * step)  # 20 of a short log
     return abs(correlation(rates(position, step, span), means(velocity, step, span)))
 
 

@@ -32,9 +32,6 @@ TIME = "time"
 END = "EOF"  # the last line of an export, where it was asked for
 _NAME, _SYMBOL, _STEP = "Name", "SymbolName", "SampleTime[ms]"
 _STARTS = ("StartRecord", "Starttime of export", "StartTime")
-_UNIX_EPOCH = 116_444_736_000_000_000  # in 100 ns since 1601
-_HEAD_BYTES = 1 << 16
-_SAMPLE_LINES = 20
 _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
 _UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -156,7 +153,7 @@ def _lines(path: Path, layout: _Layout) -> Generator[str]:
 
 def _find_layout(path: Path, stated: ImportMap) -> _Layout:
     with open(path, "rb") as stream:
-        head = stream.read(_HEAD_BYTES)
+        head = stream.read(1 << 16)
         whole = not stream.read(1)
     encoding = _encoding(head)
     text = head.decode(encoding, errors="replace")
@@ -165,7 +162,7 @@ def _find_layout(path: Path, stated: ImportMap) -> _Layout:
         lines.pop()
     if not lines:
         raise InputError("has no line of text; give a table of numbers")
-    style = _find_style(lines[-_SAMPLE_LINES:], stated)
+    style = _find_style(lines[-20:], stated)
     rows = [style.cells(line) for line in lines]
     if (scope := _scope_layout(rows, encoding, style)) is not None:
         return scope
@@ -209,7 +206,8 @@ def _scope_layout(rows: Sequence[Sequence[str]], encoding: str, style: _Style) -
     for number, k in enumerate(places[1:], 2):
         names[k] = f"{TIME}[{number}]"
     stated = (row[1] for row in rows[:first] if len(row) > 1 and row[0] in _STARTS)
-    ticks = (int(cell) - _UNIX_EPOCH for cell in stated if cell.isdigit())
+    unix_epoch = 116_444_736_000_000_000  # in 100 ns since 1601
+    ticks = (int(cell) - unix_epoch for cell in stated if cell.isdigit())
     start_ns = next((100 * t for t in ticks if t > 0), None)
     steps = sorted({style.value(cell) for cell in rows[step] if style.is_number(cell)})
     if len(steps) > 1:

@@ -35,13 +35,8 @@ from twin.importers.table import (
 from twin.isolated import isolated
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_MATLAB_HEADER = 512  # bytes before the signature in a MAT file of version 7.3
 ROWS = "data"  # what the rows of a bare list are called in JSON
 _PERIOD = "wf_increment"  # s a sample, of TDMS
-SHORTEST = 5.0  # s that a MAT file may take, whatever its size
-SLOWEST = 2e7  # bytes of its content a second
-COPIES = 4  # of its content, that SciPy and the way back to this process take
-_HEADER, _COMPRESSED = 128, 15
 _FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of them, at once
 
 
@@ -143,14 +138,18 @@ def read_tdms(path: Path, mapping: ImportMap) -> Table:
 
 def read_mat(path: Path, mapping: ImportMap) -> Table:
     """Columns of a MAT file; raises InputError."""
+    matlab_header = 512  # bytes before the signature in a MAT file of version 7.3
     with open(path, "rb") as stream:
-        head = stream.read(_MATLAB_HEADER + len(_SIGNATURE))
-    if head.startswith(_SIGNATURE) or head[_MATLAB_HEADER:] == _SIGNATURE:  # of version 7.3
+        head = stream.read(matlab_header + len(_SIGNATURE))
+    if head.startswith(_SIGNATURE) or head[matlab_header:] == _SIGNATURE:  # of version 7.3
         return read_hdf5(path, mapping, separator=".")
     with parsing("MAT"):
         content = content_bytes(path)
     # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
-    seconds, memory = SHORTEST + content / SLOWEST, SMALLEST_TABLE + COPIES * content
+    shortest = 5.0  # s that a MAT file may take, whatever its size
+    slowest = 2e7  # bytes of its content a second
+    copies = 4  # of its content, that SciPy and the way back to this process take
+    seconds, memory = shortest + content / slowest, SMALLEST_TABLE + copies * content
     return Table(isolated(_load, path, mapping.column_names(), seconds=seconds, memory=memory))
 
 
@@ -160,16 +159,17 @@ def content_bytes(path: Path) -> int:
     What is compressed proves itself by a checksum, so that only so much memory need be granted as
     there are data. Raises zlib.error, and InputError for more than such a file may hold.
     """
+    header, compressed = 128, 15
     size = path.stat().st_size
     with open(path, "rb") as stream:
-        marks = stream.read(_HEADER)[-4:]
+        marks = stream.read(header)[-4:]
         if marks not in (b"\x00\x01IM", b"\x01\x00MI"):  # version 5 to 7.2, either byte order
             return size
         tag = struct.Struct("<II" if marks.endswith(b"IM") else ">II")
         total = 0
         while len(head := stream.read(tag.size)) == tag.size:
             kind, length = tag.unpack(head)
-            if kind == _COMPRESSED:
+            if kind == compressed:
                 for piece in _inflated(stream.read(min(length, size))):
                     total += piece
                     require_fits(total, path)

@@ -36,10 +36,6 @@ from twin.logs.topics import IDENTIFIER
 
 _TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
 _TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-_SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-_EVEN = 0.01  # of a step; what is less even needs resample
-_ALIKE = 0.1  # how far a velocity may be off the rate of its position to be in the same unit
-_NAMED = 0.3  # least correlation with the rate of a position of what is called one
 
 # Words that name a signal, the surest first.
 WORDS: Mapping[str, tuple[str, ...]] = {
@@ -60,9 +56,6 @@ _FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken fo
 # SI units a count that are assumed, of the size of an encoder's: 1 um and some thousand a turn
 _COUNT = {"m": 1e-6, "m/s": 1e-6, "rad": 1e-3, "rad/s": 1e-3}
 _COMMON = ("m", "mm", "um", "rad", "deg")  # units in which one column may be, its copy in another
-_AS_LARGE = 1.25  # times, by which a soft loop may miss the size of its setpoint
-_SURE = 1.06  # the same, where another unit must be what makes the difference,
-_SAME = 0.99  # and least correlation then: a force that a spring makes may be as large by chance
 _KINDS = tuple(dict.fromkeys((*LINEAR_UNITS.values(), *ROTARY_UNITS.values())))
 
 
@@ -122,7 +115,8 @@ def signals_of(names: Sequence[str], columns: Columns, step: float) -> dict[str,
     measured = columns[found["position"].name]
     for field in ("velocity", "setpoint_velocity"):
         called = found.get(field)
-        if called and likeness_to_rate(measured, columns[called.name], step) < _NAMED:
+        # least correlation with the rate of a position of what is called one
+        if called and likeness_to_rate(measured, columns[called.name], step) < 0.3:
             left.append(found.pop(field).name)
     left = _with_setpoints(found, left, columns, step)
     forces = [n for n in left if not (_is_other(n, "force") and _is_other(n, "current"))]
@@ -195,10 +189,14 @@ def _unit_of(leader: Leader, unit: str) -> str | None:
     size = find_unit(unit, *kinds).size if is_unit(unit, *kinds) else 1.0
     stated = unit_in(leader.name)
     for other in [stated] if stated else [unit, *(u + rate for u in _COMMON)]:
+        # and least correlation then: a force that a spring makes may be as large by chance
+        same = 0.99
         if other == unit:
-            off, most = leader.slope, _AS_LARGE
-        elif is_unit(other, *kinds) and (stated or leader.likeness > _SAME):
-            off, most = leader.slope * find_unit(other, *kinds).size / size, _SURE
+            as_large = 1.25  # times, by which a soft loop may miss the size of its setpoint
+            off, most = leader.slope, as_large
+        elif is_unit(other, *kinds) and (stated or leader.likeness > same):
+            sure = 1.06  # the same, where another unit must be what makes the difference,
+            off, most = leader.slope * find_unit(other, *kinds).size / size, sure
         else:
             continue
         if 1.0 / most < off < most:
@@ -373,12 +371,13 @@ def _clock(
     step = float(np.median(steps[steps > 0.0]))
     unit, reason = unit_in(time, "s"), "its name states the unit"
     if unit is None or not is_unit(unit, "s"):
-        fits = [u for u, size in _TIME_SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
+        slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
+        fits = [u for u, size in _TIME_SIZES.items() if slowest <= size / step <= fastest]
         unit = fits[0] if fits else "s"
         reason = f"that is {_TIME_SIZES[unit] / step:.6g} Hz"
     seconds = step * find_unit(unit, "s").size
     lines = [f"time = {_table(time, unit)} # rises by {step:.6g} {unit}: {reason}"]
-    if np.abs(steps - step).max() > _EVEN * step:
+    if np.abs(steps - step).max() > 0.01 * step:  # of a step; what is less even needs resample
         rate = float(f"{1.0 / seconds:.2g}")
         spread = f"{steps.min():.4g} to {steps.max():.4g} {unit}"
         lines.append(f"resample = {rate:g} # Hz, because the steps are uneven: {spread}")
@@ -425,7 +424,8 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
         unit = f"{base}/s"
         moved, given = rates(columns[position.name], step), means(column, step)
         ratio = float(moved @ given / (given @ given))
-        if field == "velocity" and abs(ratio - 1.0) > _ALIKE:
+        alike = 0.1  # how far a velocity may be off the rate of its position to be in the same unit
+        if field == "velocity" and abs(ratio - 1.0) > alike:
             why = f", but one of it is {ratio:.3g} {unit} by the position: correct one of the units"
     return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"
 

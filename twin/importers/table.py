@@ -19,7 +19,6 @@ from twin.logs.log import Array
 from twin.numbers import first_not_finite
 
 _REAL = int | float | np.integer | np.floating
-_MOST_NAMES = 40  # columns listed in a message
 SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 
@@ -49,16 +48,17 @@ class Table:
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
     """Raises InputError that lists the columns there are where a wanted one is missing."""
+    most_names = 40  # columns listed in a message
     names = list(there)
     for name in wanted:
         if names.count(name) > 1:
             raise InputError(f"{names.count(name)} columns are called '{name}'; rename them")
         if name not in names:
-            more = len(names) - _MOST_NAMES
+            more = len(names) - most_names
             tail = f" and {more} more" if more > 0 else ""
             raise InputError(
                 f"there is no column '{name}'; {near(name, names, cutoff=0.5)}columns: "
-                f"{', '.join(names[:_MOST_NAMES]) or 'none'}{tail}"
+                f"{', '.join(names[:most_names]) or 'none'}{tail}"
             )
 
 

@@ -42,11 +42,6 @@ RESULTS = {
     Kind.FRICTION: {OUT},
     Kind.STRUCTURE: {OUT, U},
 }
-STEPS = (1e-5, 1e-4, 1e-3)  # s
-LEAST_ACTION = 0.02  # N rms, or um of a reading
-ROUNDING = 1e-11  # between the compiled and the plain law, of the largest value
-GUARDED_SAMPLES = 40  # plain Python is slow, and each value is one more run
-NAMED_VALUES = 3  # in a message
 
 _SLOTS = {number: name for name, number in vars(slots).items() if isinstance(number, int)}
 
@@ -57,9 +52,10 @@ class LawBroken(Exception):
 
 def with_values(effect: Effect, values: Values) -> str:
     """The values in words: those that are not at their start, the first few."""
+    named_values = 3  # in a message
     changed = [p for p in effect.parameters if values[p.name] != p.start]
-    told = [f"{p.name} = {values[p.name]:g} {p.unit}" for p in changed[:NAMED_VALUES]]
-    more = [f"{len(changed) - NAMED_VALUES} more values"] * (len(changed) > NAMED_VALUES)
+    told = [f"{p.name} = {values[p.name]:g} {p.unit}" for p in changed[:named_values]]
+    more = [f"{len(changed) - named_values} more values"] * (len(changed) > named_values)
     return f"with {', '.join(told + more)}" if told else "with every value at its start"
 
 
@@ -70,7 +66,8 @@ def check_declared(effect: Effect) -> None:
     is not finite's business here.
     """
     rng = np.random.default_rng(10)
-    samples = sampled(Motion.random(rng, GUARDED_SAMPLES)).tolist()
+    guarded_samples = 40  # plain Python is slow, and each value is one more run
+    samples = sampled(Motion.random(rng, guarded_samples)).tolist()
     present = {p.name: p.start or 0.1 if p.strength else p.start for p in effect.parameters}
     for values in (legal(effect, present), *extremes(effect, rng)):
         p = Guarded("p", [values[q.name] for q in effect.parameters])
@@ -130,7 +127,7 @@ def check_zero_is_absent(effect: Effect) -> None:
 def check_acts(effect: Effect) -> None:
     """Within its bounds the effect can act with a force, or on a reading, that matters."""
     most = action(effect, moderate(effect, np.random.default_rng(11)))
-    if not most > LEAST_ACTION:
+    if not most > 0.02:  # N rms, or um of a reading
         sensing = effect.kind is Kind.SENSING
         unit = f"u{LINEAR.position}" if sensing else LINEAR.force
         reach = np.abs(Motion.cycles().x).max()
@@ -145,7 +142,7 @@ def check_finite(effect: Effect) -> None:
     rng = np.random.default_rng(12)
     v = np.array([0.0, 0.0, 1e-300, -1e-300, 1e-9, -1e-9, 0.0, 0.1, 0.1, -0.1, 0.0, 5.0, -5.0, 0.0])
     x = np.array([0.0, 0.0, 0.0, 0.0, 1e-9, 0.0, 0.0, 0.1, 0.2, -0.1, -0.2, 1.0, -1.0, 0.0])
-    for dt in STEPS:
+    for dt in (1e-5, 1e-4, 1e-3):  # s
         motion = Motion(dt, x, v, 10.0 * v)
         for values in extremes(effect, rng):
             found = trace(effect, values, motion)
@@ -166,7 +163,8 @@ def check_compiled_equals_python(effect: Effect) -> None:
         values, motion = moderate(effect, rng), Motion.random(rng, samples=200)
         native = trace(effect, values, motion)
         plain = trace(effect, values, motion, law=effect.law)
-        _require_equal(native, plain, ROUNDING, "compiled and as plain Python")
+        rounding = 1e-11  # between the compiled and the plain law, of the largest value
+        _require_equal(native, plain, rounding, "compiled and as plain Python")
         listed = trace(effect, values, motion, law=_on_lists(effect.law))
         _require_equal(listed, plain, 0.0, "on lists and on arrays")
 

@@ -19,25 +19,24 @@ from twin.model.units import LINEAR, dimension
 
 WORK = f"{LINEAR.force} {LINEAR.position}"
 ROUNDING = 1e-9  # of the work that went to and fro
-AMPLITUDES = (1e-6, 1e-4, 1e-2, 0.15)  # m
-RATES = (2500.0, 10_000.0)  # Hz, the second a multiple of the first
-# RMS of the difference over that of the result. What is integrated coarsely stays below 0.1, a sum
-# over samples without the sample period is off by 0.75.
-RATES_APART = 0.3
 
 
 def check_sample_rate(effect: Effect) -> None:
     """The same motion sampled four times as often leaves about the same force, or reading."""
+    rates = (2500.0, 10_000.0)  # Hz, the second a multiple of the first
     values = moderate(effect, np.random.default_rng(17))
-    slow, fast = (acted(effect, values, Motion.cycles(samples=round(rate))) for rate in RATES)
-    every = round(RATES[1] / RATES[0])
+    slow, fast = (acted(effect, values, Motion.cycles(samples=round(rate))) for rate in rates)
+    every = round(rates[1] / rates[0])
     for one, all_of_other in zip(slow, fast, strict=True):
         other = all_of_other[::every]
         apart, size = (float(np.sqrt(np.mean(r**2))) for r in (one - other, other))
-        if not apart <= RATES_APART * size:
+        # of the result, RMS: what is integrated coarsely stays below 0.1,
+        # a sum over samples without the sample period is off by 0.75
+        rates_apart = 0.3
+        if not apart <= rates_apart * size:
             unit = LINEAR.position if effect.kind is Kind.SENSING else LINEAR.force
             raise LawBroken(
-                f"sampled at {RATES[0]:g} Hz and at {RATES[1]:g} Hz its results are {apart:.3g} "
+                f"sampled at {rates[0]:g} Hz and at {rates[1]:g} Hz its results are {apart:.3g} "
                 f"{unit} rms apart, of {size:.3g} {unit}; what grows with each sample must be in "
                 "proportion to io[DT], or to the way gone"
             )
@@ -67,7 +66,7 @@ def check_dissipative(friction: Effect, modifier: Effect | None = None) -> None:
     if modifier:  # with a moderate action, and at its most
         around = [[Fitted.at_start(modifier, moderate(modifier, rng, w))] for w in (0.3, 1e9)]
     for values in (friction.starts(), moderate(friction, rng)):
-        for amplitude, changed in product(AMPLITUDES, around):
+        for amplitude, changed in product((1e-6, 1e-4, 1e-2, 0.15), around):  # m
             given, size = _work(friction, values, Motion.cycles(amplitude), *changed)
             if not given <= ROUNDING * size:
                 beside = f" under {modifier.name}" if modifier else ""
@@ -107,7 +106,6 @@ def check_of_position_alone(effect: Effect) -> None:
 # as it is that of the moved mass of 1 kg with which a law is tried.
 OTHER_UNITS = ((1.0, 4.0, 2.0), (4.0, 1.0, 0.5))
 ALIKE = 1e-6  # of the largest result
-HELD = 0.05  # of it: a force of time is that of an instant, or its mean over the sample
 _RESULT_UNITS = {OUT: "N", U: "N", READING: "m", DRY: "1", STATIC: "1", VISCOUS: "1"}
 
 
@@ -160,7 +158,8 @@ def check_equation(effect: Effect) -> None:
         return
     got = found.after[:, OUT]
     off = np.abs(got - wanted)
-    allowed = HELD if effect.reads("TIME") else ALIKE
+    held = 0.05  # of it: a force of time is that of an instant, or its mean over the sample
+    allowed = held if effect.reads("TIME") else ALIKE
     if not off.max() <= allowed * max(np.abs(wanted).max(), np.abs(got).max()):
         k = int(np.argmax(off))
         turned = np.allclose(got, -wanted, rtol=ALIKE, atol=ALIKE * np.abs(got).max())

@@ -119,9 +119,6 @@ class Trace:
     p_changed: bool
 
 
-_MARK = 0.123456789  # in the memory behind a law's own parameters and states
-
-
 def compiled(effect: Effect, *arrays: Array) -> Callable[[], object]:
     """The effect's native law on these arrays of parameters, states and io."""
     pointer = ctypes.POINTER(ctypes.c_double)
@@ -131,9 +128,10 @@ def compiled(effect: Effect, *arrays: Array) -> Callable[[], object]:
 
 def trace(effect: Effect, values: Values, motion: Motion, law: Callable | None = None) -> Trace:
     """Step the compiled law, or the one given, over a motion."""
-    given = np.array([*(values[p.name] for p in effect.parameters), _MARK])
+    mark = 0.123456789  # in the memory behind a law's own parameters and states
+    given = np.array([*(values[p.name] for p in effect.parameters), mark])
     p, own = given.copy(), len(effect.states)
-    s = np.concatenate([np.zeros(own), [_MARK]])
+    s = np.concatenate([np.zeros(own), [mark]])
     io = np.zeros(IO_SIZE)
     step = partial(law, p, s, io) if law else compiled(effect, p, s, io)
     before = sampled(motion)
@@ -142,11 +140,10 @@ def trace(effect: Effect, values: Values, motion: Motion, law: Callable | None =
         io[:] = row
         step()
         after[k], states[k] = io, s[:own]
-    return Trace(before, after, states, s[own] != _MARK, not np.array_equal(p, given))
+    return Trace(before, after, states, s[own] != mark, not np.array_equal(p, given))
 
 
 TRIED = Scale(1.0, 0.1, 1.0)  # N, m, s: about the motion of ``action``
-ENORMOUS = 10.0  # times what is usual there
 
 
 @cache
@@ -194,7 +191,7 @@ def companion(friction: Effect) -> Fitted:
 
 def _span(p: Parameter) -> tuple[float, float]:
     """Bounds of a strength, or what is enormous along the motion of ``action``."""
-    far = ENORMOUS * TRIED.size(p.unit) if has_size(p.unit) else np.inf
+    far = 10.0 * TRIED.size(p.unit) if has_size(p.unit) else np.inf  # times what is usual there
     return max(p.lower, -far), min(p.upper, far)
 
 

@@ -26,10 +26,7 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 _FOOTER_SIZE = RECORD_HEAD.size + 20
 IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-SMALLEST_INFLATION = 1 << 24  # bytes, whatever the size of the file
 LARGEST_RATIO = 256  # of what any format of this house shrinks to
-LARGEST_BOMB = 1 << 27  # bytes of a chunk that shrank by more than is usual
-USUAL_RATIO = 16  # samples of a drive shrink by 2 to 10
 
 T = TypeVar("T")
 
@@ -228,11 +225,14 @@ class Inflation:
     """
 
     def __init__(self, file_size: int) -> None:
-        self._most = self._left = SMALLEST_INFLATION + LARGEST_RATIO * file_size
+        smallest_inflation = 1 << 24  # bytes, whatever the size of the file
+        self._most = self._left = smallest_inflation + LARGEST_RATIO * file_size
 
     def take(self, size: int, stored: int) -> None:
         """Take the bytes of a chunk that is stored in so many; raises Damaged."""
-        if size > max(LARGEST_BOMB, USUAL_RATIO * stored):
+        largest_bomb = 1 << 27  # bytes of a chunk that shrank by more than is usual
+        usual_ratio = 16  # samples of a drive shrink by 2 to 10
+        if size > max(largest_bomb, usual_ratio * stored):
             raise Damaged(f"announces {size} bytes, but has {stored}")
         if size > self._left:
             raise Damaged(

@@ -22,7 +22,6 @@ from twin.logs.topics import AXIS_PREFIX, TRUTH_PREFIX, Topic, Topics, axis_of, 
 METADATA_NAME = "twin"
 CHECKSUM = "checksum"  # entry of the metadata, as their record has none
 SCHEMA_VERSION = "1"
-EARLY = 0.1  # of a period: how much before a sample a range may begin to hold it
 
 
 @dataclass(frozen=True)
@@ -273,8 +272,9 @@ class Run:
             raise InputError(f"has no samples from {start:g} to {stop:g} s")
         rate, common = self._rate(), self._common
         zero = max(s.start for s in self._series.values()) * 1e-9
+        early = 0.1  # of a period: how much before a sample a range may begin to hold it
         first, last = (
-            common.start + math.ceil(min(max((t - zero) * rate - EARLY, 0), len(common)))
+            common.start + math.ceil(min(max((t - zero) * rate - early, 0), len(common)))
             for t in (start, stop)
         )
         if first == last:

@@ -26,8 +26,6 @@ from twin.logs.log import FIELDS, Array
 AXIS_SAMPLE = "twin.AxisSample"
 AXIS_TRUTH = "twin.AxisTruth"
 
-_DOUBLE_ON_WIRE = 1  # the type of a field, in the low three bits of its tag
-
 
 def numbered(names: Iterable[str]) -> dict[str, int]:
     """The field numbers of columns; from this first one on, the tag of a field has four bytes.
@@ -78,7 +76,8 @@ def field_numbers(channel: Channel, schema: Schema | None) -> dict[str, int]:
 
 def tag(number: int) -> bytes:
     """The bytes before the double of a field: 7 bits each, the low ones first."""
-    value, out = number << 3 | _DOUBLE_ON_WIRE, bytearray()
+    double_on_wire = 1  # the type of a field, in the low three bits of its tag
+    value, out = number << 3 | double_on_wire, bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)
         value >>= 7
@@ -94,7 +93,6 @@ _HEAD = [
     (".log_time", "<u8"),
     (".publish_time", "<u8"),
 ]
-_OUTSIDE_LENGTH = 9  # opcode and length, which the record's length does not count
 _VARYING = (".sequence", ".log_time", ".publish_time")
 
 
@@ -137,7 +135,8 @@ class MessageLayout:
         """(1,) record with every constant filled in, everything else 0."""
         record = np.zeros(1, self.dtype)
         record[".opcode"] = Opcode.MESSAGE
-        record[".length"] = self.dtype.itemsize - _OUTSIDE_LENGTH
+        outside_length = 9  # opcode and length, which the record's length does not count
+        record[".length"] = self.dtype.itemsize - outside_length
         record[".channel"] = self.channel
         for name, number in self.numbers.items():
             record[f"{name}.tag"] = np.frombuffer(tag(number), self.dtype[f"{name}.tag"])

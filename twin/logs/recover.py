@@ -50,14 +50,10 @@ from twin.logs.writer import write_parts
 
 GAP = "a gap separates them from the longer run"
 METADATA = "the metadata (experiment, seed, source) has no checksum of its own"
-INTACT_STEP = 1 << 17  # samples of an intact log that are held in memory at a time: some 20 MB
-STEP = 1 << 15  # the same of a damaged one, whose chunks are held beside them
 
 _HEAD = struct.Struct("<BQQQQI8sQ")  # of a chunk, up to its data
 _ZSTD = b"\x04\0\0\0zstd"
 _NAME_AT = _HEAD.size - len(_ZSTD) - 8  # of the compression, in the head
-_WINDOW = 1 << 18  # bytes that are searched at a time
-_LEAST_ROOM = 1 << 12  # bytes: what does not shrink may grow, a little
 _OPCODES = frozenset(Opcode)
 _Kept = tuple[str, Callable[[], Iterator[Log]]]
 """A stretch of samples: what it is, and its logs, which follow each other."""
@@ -133,7 +129,9 @@ def _recovered(path: Path, unproved: bool) -> Iterator[tuple[list[_Kept], Recove
 def _intact(path: Path) -> Iterator[Log]:
     """A log in which no fault is found, in parts; raises InputError."""
     with open_mcap(path) as file:
-        yield from log_parts(file, file.records(), EVERYTHING, INTACT_STEP)
+        # samples of an intact log that are held in memory at a time: some 20 MB
+        intact_step = 1 << 17
+        yield from log_parts(file, file.records(), EVERYTHING, intact_step)
 
 
 @dataclass(frozen=True)
@@ -165,8 +163,9 @@ class _FoundChunk:
 def _found_chunks(file: FileBytes) -> Iterator[_FoundChunk]:
     """The chunks that can be decompressed and have no wrong checksum, none within a proved one."""
     budget, behind = Inflation(len(file)), 0
-    for place in range(0, len(file), _WINDOW):
-        data = file.part(place, place + _WINDOW + _HEAD.size)  # with all of a head that begins here
+    window = 1 << 18  # bytes that are searched at a time
+    for place in range(0, len(file), window):
+        data = file.part(place, place + window + _HEAD.size)  # with all of a head that begins here
         for name in re.finditer(re.escape(_ZSTD), data[_NAME_AT:-8]):
             offset = place + name.start()
             head = _HEAD.unpack_from(data, name.start())
@@ -180,7 +179,8 @@ def _opened(file: FileBytes, offset: int, head: tuple, budget: Inflation) -> _Fo
     _, length, _, _, size, crc, _, inner = head
     start, outer = offset + _HEAD.size, length - (_HEAD.size - RECORD_HEAD.size)
     for stored in dict.fromkeys((inner, outer)):
-        if not 0 < stored <= min(len(file) - start, 2 * size + _LEAST_ROOM):
+        least_room = 1 << 12  # bytes: what does not shrink may grow, a little
+        if not 0 < stored <= min(len(file) - start, 2 * size + least_room):
             continue
         found = _FoundChunk(offset, start + stored, size, crc, stored == outer)
         try:
@@ -228,8 +228,9 @@ class _Stretch:
     def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
         """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
         rate, every = self.empty(extras).sample_rate, self.pieces.values()
-        for first in self.samples[::STEP]:
-            stop = min(first + STEP, self.samples.stop)
+        step = 1 << 15  # the same of a damaged one, whose chunks are held beside them
+        for first in self.samples[::step]:
+            stop = min(first + step, self.samples.stop)
             columns = ((own[0].topic, _columns(own, first, stop, read)) for own in every)
             yield assembled(columns, rate, extras)
 

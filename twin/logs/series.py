@@ -13,14 +13,11 @@ from twin.logs.messages import Block, sample_times
 from twin.logs.topics import Topic
 from twin.numbers import first_not_finite
 
-EARLIEST, LATEST = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
-ROUNDING = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
-LATEST_TIME = 1 << 62  # ns, 146 years: no clock of a machine, and no sum of two overflows
-
 
 def is_calendar(seconds: float) -> bool:
     """Whether a time in s counts since 1970."""
-    return EARLIEST < seconds < LATEST
+    earliest, latest = 5e8, 5e9  # s since 1970, between which a time is that of a calendar
+    return earliest < seconds < latest
 
 
 def seconds(nanoseconds: float) -> str:
@@ -109,11 +106,12 @@ def require_even(topic: Topic, block: Block, sequence: int, start: int, count: i
         latest = int(block.log_time.max())
         raise InputError(f"{name}: a message has the time {latest} ns, which no clock shows")
     last = (count + len(expected)) * 1e9 / rate
-    if not last < LATEST_TIME:
+    if not last < 1 << 62:  # ns, 146 years: no clock of a machine, and no sum of two overflows
         raise InputError(f"{name}: at {rate:g} Hz {len(expected)} samples would last {last:g} ns")
     elapsed = time - start
     times = sample_times(count, len(elapsed), rate)
-    off = np.abs(elapsed - times) > ROUNDING
+    rounding = 2.0  # ns: how far a time may be off that of its number, of which both are rounded
+    off = np.abs(elapsed - times) > rounding
     if off.any():
         i = int(np.argmax(off))
         before, now = (int(elapsed[i - 1]) if i else times[0] - 1e9 / rate), int(elapsed[i])

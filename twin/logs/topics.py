@@ -20,7 +20,6 @@ from twin.logs.messages import Block, MessageLayout, blocks_of, field_numbers
 AXIS_PREFIX = "/axis/"
 TRUTH_PREFIX = "/truth/"
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-MOST_DEFINITIONS = 100_000  # of schemas and channels in a chunk; there are 65535 of each
 _MESSAGE = struct.Struct("<BQH")  # opcode, length of what follows, channel
 
 
@@ -160,8 +159,10 @@ class Topics:
             if opcode == Opcode.MESSAGE:
                 break
             registered += 1
-            if registered > MOST_DEFINITIONS:
-                raise Damaged(f"more than {MOST_DEFINITIONS} schemas and channels in one chunk")
+            # of schemas and channels in a chunk; there are 65535 of each
+            most_definitions = 100_000
+            if registered > most_definitions:
+                raise Damaged(f"more than {most_definitions} schemas and channels in one chunk")
             self.register(opcode, content)
             offset = end
         if offset == len(data):

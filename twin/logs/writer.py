@@ -41,7 +41,6 @@ from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_uni
 from twin.numbers import first_not_finite
 
 CHUNK_BYTES = 1 << 20  # of the samples in all chunks of a stretch, as the format recommends
-WORKERS = 2  # threads that compress; more would wait for the disk
 SERIES = "twin.Series"  # the message of a topic that no log of a machine has
 # Made for messages that repeat every few hundred bytes: tables that soon forget find the last one.
 # With the tags of `numbered` 8 % smaller than level 3, which most writers use, in half of its time.
@@ -313,11 +312,12 @@ def _packed(
 
 def _ordered(function: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
     """Results in the order of ``items``, a few of them computed ahead on other threads."""
-    with ThreadPoolExecutor(WORKERS) as pool:
+    workers = 2  # threads that compress; more would wait for the disk
+    with ThreadPoolExecutor(workers) as pool:
         pending: deque[Future[T]] = deque()
         for item in items:
             pending.append(pool.submit(function, item))
-            if len(pending) > WORKERS:
+            if len(pending) > workers:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()

@@ -57,7 +57,6 @@ class AxisIntervals:
 MASS = Parameter(LINEAR.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moved mass")
 # Declared linear as all parameters are.
 INERTIA = Parameter(ROTARY.mass_name, LINEAR.mass, 1.0, LEAST, MOST, "moment of inertia")
-MOST_ELEMENTS = 1000
 OF_IMPOSED_MOTION = (Kind.FORCE, Kind.MODIFIER, Kind.FRICTION)  # need neither mass nor motor
 MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
 
@@ -124,10 +123,11 @@ def _sized(effect: Effect, values: Mapping[str, float]) -> Effect:
     count = values.get(ELEMENTS)
     if effect.of_size is None or count is None:
         return effect
-    if not (is_number(count) and float(count).is_integer() and 1 <= count <= MOST_ELEMENTS):
+    most_elements = 1000
+    if not (is_number(count) and float(count).is_integer() and 1 <= count <= most_elements):
         raise InputError(
             f"{effect.name}.{ELEMENTS} = {count!s:.60}: give a whole number of elements from 1 to "
-            f"{MOST_ELEMENTS}"
+            f"{most_elements}"
         )
     return effect.of_size(int(count)).numbered(effect.number)
 

@@ -49,7 +49,6 @@ if TYPE_CHECKING:
 UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its version"
 NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
-LARGEST_STRUCT = 1 << 19  # bytes
 HEADER = 6  # period, axes, states, entries, parameters, first userdata
 USER_HEADER = 2  # time of the last call, s; time origin, s; then the states
 AXIS_COLUMNS = 8  # first entry, last entry, first state, mass, qpos, dof, actuator, rotor
@@ -111,7 +110,7 @@ def _word_at(address: int, offset: int) -> int:
 
 def _find(address: int, wanted: int) -> int:
     """Offset of a word; an empty array before the one sought has the same address, so the last."""
-    for offset in range(0, LARGEST_STRUCT, 8):
+    for offset in range(0, 1 << 19, 8):  # bytes
         if _word_at(address, offset) == wanted:
             return max(o for o in range(offset, offset + 64, 8) if _word_at(address, o) == wanted)
     raise RuntimeError(UNKNOWN_LAYOUT)

@@ -39,8 +39,6 @@ from twin.signals import Array
 
 CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
 AHEAD = 1e-6  # rad or m, by which the joints move on, of the change of the mass matrix
-LEAST_INERTIA = 1e-9  # kg, kg m^2: of a body whose file rounds its inertia to 0
-POSES = 256  # over which the inertia about a joint is averaged
 PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of a joint, which are effects here
 SLIDE, HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -52,7 +50,8 @@ def read_bodies(text: str, name: str) -> mujoco.MjSpec:
     """
     spec = read_spec(text, name)
     spec.compiler.fusestatic = False  # a body keeps its name
-    spec.compiler.boundmass = spec.compiler.boundinertia = LEAST_INERTIA
+    least_inertia = 1e-9  # kg, kg m^2: of a body whose file rounds its inertia to 0
+    spec.compiler.boundmass = spec.compiler.boundinertia = least_inertia
     spec.compiler.balanceinertia = True
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     for body in spec.bodies[1:]:
@@ -309,13 +308,14 @@ def _inertias(
     low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free)[at].T
     total, full = np.zeros(len(at)), np.zeros((model.nv, model.nv))
     least = np.full(len(at), np.inf)
-    for _ in range(POSES):
+    poses = 256  # over which the inertia about a joint is averaged
+    for _ in range(poses):
         pose = rng.uniform(low, high)
         data.qpos[:] = followed.ratio * pose[followed.axis] + followed.offset
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
         own = followed.reduced(full, len(at))
-        total += np.diag(own) / POSES
+        total += np.diag(own) / poses
         least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(own)))
     return total, least
 

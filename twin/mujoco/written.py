@@ -14,7 +14,6 @@ from twin.signals import Array
 _TAG = re.compile(
     r"<!--.*?-->|<(?P<end>/?)(?P<kind>[\w:.-]+)(?:[^>\"']|\"[^\"]*\"|'[^']*')*>", re.DOTALL
 )
-ACCURACY = 1e-4  # relative, to which the file holds what is written into it
 
 
 def in_mjcf(text: str, name: str) -> str:
@@ -85,7 +84,8 @@ def with_inertial(
     made = text if place is None else text[: place[0]] + element + text[place[1] :]
     mechanism = mechanism_of(made, name, joints)
     has = mechanism.inertial(mechanism.axes.index(axis))
-    if not np.allclose(has, wanted, rtol=ACCURACY, atol=ACCURACY * np.abs(wanted).max()):
+    accuracy = 1e-4  # relative, to which the file holds what is written into it
+    if not np.allclose(has, wanted, rtol=accuracy, atol=accuracy * np.abs(wanted).max()):
         raise InputError(
             f"{name}: the body of joint '{joints[axis]}' does not take its inertia from an "
             f"inertial element in it; write {element} where its inertia is made"

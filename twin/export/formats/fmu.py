@@ -24,7 +24,6 @@ from twin.model.machine import MachineModel
 
 WRAPPER = Path(__file__).parent.parent / "fmi2.c"
 BINARIES = {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib"), "Windows": ("win", ".dll")}
-OLDEST = (1980, 1, 1, 0, 0, 0)  # of a file in a zip: the same model gives the same bytes
 
 Signal = tuple[str, str, str]  # name, unit, what it is
 
@@ -43,7 +42,9 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name, OLDEST), content)
+            # of a file in a zip: the same model gives the same bytes
+            oldest = (1980, 1, 1, 0, 0, 0)
+            archive.writestr(zipfile.ZipInfo(name, oldest), content)
     lost = (*made.lost, *(Remark(a.name, "binary", why) for a in made.axes if why))
     return Exported({f"{made.name}.fmu": stream.getvalue()}, made.kept, made.approximated, lost)
 

@@ -29,7 +29,6 @@ from twin.mujoco.written import in_mjcf, with_joint, with_motor
 from twin.signals import Array, between
 
 UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
-SWING, SAMPLE = 10.0, 1e-3  # s, of the sine over the travel on which losses are told without a log
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
@@ -163,10 +162,12 @@ def _motion(position: Array, period: float) -> tuple[Array, float]:
 
 def _swing(axis: AxisModel) -> tuple[Array, float]:
     """A sine over the travel at the fastest move's speed."""
+    # s, of the sine over the travel on which losses are told without a log
+    swing, sample = 10.0, 1e-3
     low, high = axis.hardware.travel or (-1.0, 1.0)
     reach = 0.5 * (high - low)
-    turn = axis.hardware.velocity / reach * np.arange(0.0, SWING, SAMPLE)
-    return _motion(0.5 * (low + high) + reach * np.sin(turn), SAMPLE)
+    turn = axis.hardware.velocity / reach * np.arange(0.0, swing, sample)
+    return _motion(0.5 * (low + high) + reach * np.sin(turn), sample)
 
 
 EXPORTER = Exporter(

@@ -18,8 +18,6 @@ from twin.export.tables import AxisTables, exported, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
-UNLIMITED = 1e9  # N, where the model has no force limit: URDF asks for a number
-
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """The limits as YAML, and the joints as a piece of a robot's description."""
@@ -69,7 +67,8 @@ def _joint(name: str, axis: AxisModel, of: AxisTables) -> str:
     level = float(of.odd[0])
     damping = float((of.odd[-1] - level) / of.speeds[-1])
     ends = 'lower="{!r}" upper="{!r}" '.format(*hardware.travel) if hardware.travel else ""
-    effort = min(hardware.force_limit, UNLIMITED)
+    unlimited = 1e9  # N, where the model has no force limit: URDF asks for a number
+    effort = min(hardware.force_limit, unlimited)
     return f"""  <joint name="{name}" type="{kind}">
     <limit {ends}velocity="{hardware.velocity!r}" effort="{effort!r}"/>
     <!-- friction {units.force}, damping {units("N s/m")} -->

@@ -18,10 +18,6 @@ from twin.export.tables import ENTRIES, AxisTables, Judged, exported, fewest_poi
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
-POINTS = 20  # P-COMP-00062, as it is delivered
-MODE = 3  # P-COMP-00041: current by commanded speed, the only mode
-WHOLE = 1000  # P-COMP-00045: 100.0 %
-
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """For each axis a compensation value list, and a file for each effect that repeats."""
@@ -37,7 +33,7 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
 
 def _held(of: AxisTables) -> AxisTables:
     """What TwinCAT has a place for: a speed table that turns with the direction, and cogging."""
-    chosen, _ = fewest_points(of.speeds, of.odd, POINTS)
+    chosen, _ = fewest_points(of.speeds, of.odd, 20)  # P-COMP-00062, as it is delivered
     still, speeds, odd = np.zeros_like(of.along), of.speeds[chosen], of.odd[chosen]
     return replace(of, along=still, speeds=speeds, forwards=odd, backwards=-odd)
 
@@ -62,9 +58,10 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
         *(f"# nearly: {r.part}, {r.text}" for r in found.approximated),
         *(f"# lost: {r.part}, {r.text}" for r in found.lost),
     ]
+    mode = 3  # P-COMP-00041: current by commanded speed, the only mode
     entries: dict[str, float] = {
-        "mode": MODE, "table_entries": len(speeds), "position_delay": 0, "reversal_lookahead": 0,
-        "scaling_factor": WHOLE, "delay_cycles": 0,
+        "mode": mode, "table_entries": len(speeds), "position_delay": 0, "reversal_lookahead": 0,
+        "scaling_factor": 1000, "delay_cycles": 0,  # P-COMP-00045: 100.0 %
     }  # fmt: skip
     for i, (speed, needed) in enumerate(zip(speeds, 1e3 * of.forwards / constant, strict=True)):
         entries |= {f"table[{i}].in": round(float(speed)), f"table[{i}].out": round(needed, 3)}
