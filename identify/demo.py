@@ -35,7 +35,6 @@ DURATION = 12.0  # s of each log
 BETTER = "better.toml"  # the model with what was found
 TRAINING, SELECTION, TEST = ("tracking", "moves"), "tracking", "moves"  # run for each role
 FORCE = 0.05  # N RMS of the hidden effect, about 50 times the noise floor
-VISIBLE = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +158,8 @@ def hidden_machine(
     ]  # fmt: skip
     for index in rng.permutation(len(absent)):
         hidden = draw_effect(absent[index], axis, dataset.fit, dataset.excitation, FORCE, rng)
-        if hidden_part(hidden, base, dataset) < 1.0 - VISIBLE:
+        visible = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
+        if hidden_part(hidden, base, dataset) < 1.0 - visible:
             return machine.with_axis(name, axis.with_effect(hidden)), hidden
     raise InputError(
         "no effect of the catalogue can be seen in the motion of this machine; try another seed"

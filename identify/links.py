@@ -49,7 +49,6 @@ INERTIAL = {
     "inertia xx": "kg m^2", "inertia yy": "kg m^2", "inertia zz": "kg m^2",
     "inertia xy": "kg m^2", "inertia xz": "kg m^2", "inertia yz": "kg m^2",
 }  # fmt: skip
-RESOLVED = 1e-6  # of the largest singular value; below, a direction of the parameters is not told
 
 
 @dataclass(frozen=True, eq=False)
@@ -420,6 +419,8 @@ def _bands(body: _Body, trial: _Trial, after: Mapping[str, Judged]) -> Array:
     By the scatter between stretches of time, of all joints together: what friction leaves at its
     reversals is no noise, and differs from joint to joint.
     """
+    # of the largest singular value; below, a direction of the parameters is not told
+    resolved = 1e-6
     rows, left, time = [], [], []
     for axis, judged in after.items():
         own = np.concatenate([trial.forces(body, log)[kept] for log, kept in _kept(judged)])
@@ -429,11 +430,11 @@ def _bands(body: _Body, trial: _Trial, after: Mapping[str, Judged]) -> Array:
     order = np.argsort(np.concatenate(time), kind="stable")
     told, noise = np.concatenate(rows)[order], np.concatenate(left)[order]
     size = np.linalg.norm(told, axis=0)
-    size[size < RESOLVED * size.max()] = np.inf
+    size[size < resolved * size.max()] = np.inf
     _, singular, turned = np.linalg.svd(told / size, full_matrices=False)
-    clear = singular > RESOLVED * singular[0]
+    clear = singular > resolved * singular[0]
     band = half_widths_by(told / size @ turned[clear].T, noise, turned[clear]) / size
-    hidden = np.linalg.norm(turned[~clear], axis=0) > np.sqrt(RESOLVED)
+    hidden = np.linalg.norm(turned[~clear], axis=0) > np.sqrt(resolved)
     return np.where(hidden | np.isinf(size), np.nan, band)
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any, NoReturn
 
-SECONDS = 2.0  # for what runs to be left in order; then the program ends where it is
-AGAIN = 0.05  # s after which a signal is raised again that a library has swallowed
 IMPORTS = "<frozen importlib._bootstrap>"  # as its code names itself
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -51,7 +49,8 @@ def _end(number: int, frame: FrameType | None) -> None:
     """Leave what runs in order. Threads that are waited for may hold that up."""
     if _loads(frame):  # a library may turn what is raised there into an error of its own
         _end_at_once(number)
-    _alarm(SECONDS, lambda *_: _end_at_once(number))
+    seconds = 2.0  # for what runs to be left in order; then the program ends where it is
+    _alarm(seconds, lambda *_: _end_at_once(number))
     raise Ended(number)
 
 
@@ -68,7 +67,8 @@ def _swallowed(fault: Any) -> None:
     """A signal that arrived within a callback from compiled code is raised again behind it."""
     if isinstance(fault.exc_value, Ended):
         number = fault.exc_value.number
-        _alarm(AGAIN, lambda *_: _end(number, None))
+        again = 0.05  # s after which a signal is raised again that a library has swallowed
+        _alarm(again, lambda *_: _end(number, None))
         return
     sys.__unraisablehook__(fault)
 

@@ -32,18 +32,6 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array, stretches, usual_size
 
 TEST_FUNCTION = 0.02  # s, short enough for spikes of a few millimetres at 0.1 m/s
-STEADY = 0.05  # of the pass speed, by which the speed may differ on a pass
-SHORTEST = 0.5  # of the longest pass, below which a stretch is no pass
-UNSETTLED = 0.03  # of the track at its ends, where friction still remembers the reversal
-GRID = 600  # positions: several in a spike of a few millimetres
-SMOOTHING = 0.02  # of the track, standard deviation of the Gaussian weights
-ORDER = 2  # of the local polynomials
-MEDIAN = 0.1  # of the track, over which the running median goes: wider than two spikes
-ROUNDS = 6  # of what is smooth and the spikes in turns; both have settled by then
-OUTSTANDING = 8.0  # times the noise: none of GRID values of noise is as large
-EDGE = 3.0  # times the noise, down to which a spike reaches
-FEWEST = 3  # spikes that tell a pitch
-MARGIN = 0.25  # of a spike's width, that is kept out on either side of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +63,10 @@ class Passes:
                 f"the {len(every)} passes at constant speed have no stretch of the track in "
                 "common; give logs of passes over the same stretch (`twin simulate cable_pass`)"
             )
-        cut = UNSETTLED * (high - low)
-        grid = np.linspace(low + cut, high - cut, GRID)
+        unsettled = 0.03  # of the track at its ends, where friction still remembers the reversal
+        cut = unsettled * (high - low)
+        # positions: several in a spike of a few millimetres
+        grid = np.linspace(low + cut, high - cut, 600)
         both = ([np.interp(grid, x, f) for x, f in way[:count]] for way in (forwards, backwards))
         return cls(grid, *map(np.stack, both))
 
@@ -103,7 +93,8 @@ def _each_way(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[list[tuple[A
         mean, force = log.test_function.mean, residual(bare, [log])
         position, velocity = mean(log.motion.position), mean(log.motion.velocity)
         speed = float(np.quantile(np.abs(velocity), 0.9))
-        steady = np.abs(np.abs(velocity) - speed) < STEADY * speed
+        # of the pass speed, by which the speed may differ on a pass
+        steady = np.abs(np.abs(velocity) - speed) < 0.05 * speed
         signed = np.where(steady, np.sign(velocity), 0.0)
         edges = [0, *(np.flatnonzero(np.diff(signed)) + 1), len(signed)]
         for first, last in pairwise(edges):
@@ -111,20 +102,23 @@ def _each_way(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[list[tuple[A
                 rising = slice(None, None, int(way))
                 ways[way].append((position[first:last][rising], force[first:last][rising]))
     longest = {way: max((len(x) for x, _ in found), default=0) for way, found in ways.items()}
+    shortest = 0.5  # of the longest pass, below which a stretch is no pass
     return [
-        [(x, f) for x, f in found if len(x) > SHORTEST * longest[way]]
+        [(x, f) for x, f in found if len(x) > shortest * longest[way]]
         for way, found in ways.items()
     ]
 
 
 def smoother(position: Array, kept: NDArray[np.bool_]) -> Array:
     """Matrix (k, k) from forces on the grid to their local polynomials, of what is kept."""
-    r = (position - position[:, None]) / (SMOOTHING * float(np.ptp(position)))
+    smoothing = 0.02  # of the track, standard deviation of the Gaussian weights
+    order = 2  # of the local polynomials
+    r = (position - position[:, None]) / (smoothing * float(np.ptp(position)))
     weight = np.exp(-0.5 * r**2) * kept
-    moments = np.stack([np.sum(weight * r**n, axis=1) for n in range(2 * ORDER + 1)], axis=1)
-    powers = np.arange(ORDER + 1)
+    moments = np.stack([np.sum(weight * r**n, axis=1) for n in range(2 * order + 1)], axis=1)
+    powers = np.arange(order + 1)
     normal = moments[:, powers[:, None] + powers]
-    value = np.zeros((len(position), ORDER + 1, 1))
+    value = np.zeros((len(position), order + 1, 1))
     value[:, 0] = 1.0
     share = np.linalg.solve(normal, value)[..., 0]
     return np.asarray(weight * sum(share[:, [n]] * r**n for n in powers))
@@ -151,18 +145,21 @@ class Pitch:
 
 def find_spikes(found: Passes) -> tuple[Spike, ...]:
     """The spikes on the track, from left to right."""
+    edge = 3.0  # times the noise, down to which a spike reaches
     from scipy.ndimage import median_filter  # no fit needs it
 
     sides = np.stack([found.forwards.mean(axis=0), -found.backwards.mean(axis=0)])
-    samples = max(round(MEDIAN * sides.shape[1]), 3)
+    median = 0.1  # of the track, over which the running median goes: wider than two spikes
+    samples = max(round(median * sides.shape[1]), 3)
     rises = sides - median_filter(sides, (1, samples), mode="nearest")
-    for _ in range(ROUNDS):
-        rises = sides - sides @ smoother(found.position, _size(rises) < EDGE).T
+    for _ in range(6):  # of what is smooth and the spikes in turns; both have settled by then
+        rises = sides - sides @ smoother(found.position, _size(rises) < edge).T
     size = _size(rises)
     spikes = []
-    for first, last in stretches(size > EDGE):
+    for first, last in stretches(size > edge):
         whole = first > 0 and last < len(size)  # a spike at the end is seen in part
-        if whole and size[first:last].max() > OUTSTANDING:
+        outstanding = 8.0  # times the noise: none of 600 values of noise is as large
+        if whole and size[first:last].max() > outstanding:
             place, own = found.position[first:last], rises[:, first:last]
             centre = float(np.average(place, weights=np.abs(own).sum(axis=0)))
             tops = [float(rise[np.argmax(np.abs(rise))]) for rise in own]
@@ -178,7 +175,7 @@ def _size(rises: Array) -> Array:
 
 def pitch_of(spikes: tuple[Spike, ...]) -> Pitch | None:
     """The pitch of spikes that are equally far apart; None of fewer than three."""
-    if len(spikes) < FEWEST:
+    if len(spikes) < 3:  # spikes that tell a pitch
         return None
     centres = np.array([s.centre for s in spikes])
     apart = np.diff(centres)
@@ -222,7 +219,8 @@ class CableForce:
         spikes = find_spikes(found)
         kept = np.ones(len(found.position), dtype=bool)
         for spike in spikes:
-            kept &= np.abs(found.position - spike.centre) > (0.5 + MARGIN) * spike.width
+            margin = 0.25  # of a spike's width, that is kept out on either side of it
+            kept &= np.abs(found.position - spike.centre) > (0.5 + margin) * spike.width
         ends = np.flatnonzero(kept)
         between = slice(ends[0], ends[-1] + 1)  # beyond a spike at the end nothing is known
         found, kept = found.part(between), kept[between]

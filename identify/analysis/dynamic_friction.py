@@ -28,10 +28,6 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, write
 from twin.signals import Array
 
-PARTS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
-HEAD = 3.0  # s of each log, on which the start is chosen
-FIRST_EVALUATIONS = 3  # of the search from each, after which the best goes on with all
-TOLERANCE = 1e-6  # relative fall of the squared error, at which the search ends
 DYNAMIC = ("sigma0", "sigma1")  # N/m, N s/m: stiffness and damping of a friction's bristles
 STATIC = "Fs"  # N, the force that they break away at
 TEST_FUNCTION = 0.1  # s
@@ -91,15 +87,19 @@ def fit_bristles(
         return residual(write(known, where, x), logs)
 
     def search(logs: Sequence[PreparedLog], start: Array, evaluations: int) -> Array:
+        tolerance = 1e-6  # relative fall of the squared error, at which the search ends
         return minimise(
             lambda x: left(x, logs), lambda x: jacobian(write(known, where, x), logs, where),
-            start, (low, high), tolerance=TOLERANCE, most_evaluations=evaluations,
+            start, (low, high), tolerance=tolerance, most_evaluations=evaluations,
         ).x  # fmt: skip
 
     deflection = max(float(np.ptp(log.motion.position)) for log in logs) / 2.0
     first = known[where[0].effect].values[STATIC] / deflection
-    starts = [np.array([p * first, rng.uniform(0.0, p * first)]) for p in PARTS]
-    heads = [PreparedLog.of(w.motion.head(HEAD), w.test_function.length) for w in logs]
-    tried = [search(heads, start, FIRST_EVALUATIONS) for start in starts]
+    parts = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the stiffness of the start rule
+    starts = [np.array([p * first, rng.uniform(0.0, p * first)]) for p in parts]
+    head = 3.0  # s of each log, on which the start is chosen
+    heads = [PreparedLog.of(w.motion.head(head), w.test_function.length) for w in logs]
+    first_evaluations = 3  # of the search from each, after which the best goes on with all
+    tried = [search(heads, start, first_evaluations) for start in starts]
     best = min(tried, key=lambda x: float(np.sum(left(x, heads) ** 2)))
     return write(known, where, search(logs, best, MOST_EVALUATIONS))

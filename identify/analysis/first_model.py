@@ -31,18 +31,7 @@ from twin.signals import Array, stretches
 
 LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
 BLOCKS = 30  # of time, for the scatter of a value
-SURE = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
-LEAST_INERTIAL = 0.005  # of the force's RMS; below, friction that is not known hides the inertia
 ROWS = 4 * BLOCKS  # test functions in motion, that tell the values and how sure they are
-AT_REST = 0.02  # part of a test function, from which what static friction holds is in its force
-TURNS = 1.0  # rad, from which gravity is a sine of the angle, and no spring
-STOOD = 0.05  # s at rest before a motion begins from rest
-NEARLY = 1.5  # times what viscous friction leaves, up to which Coulomb's is believed
-ONE_WAY = 0.8  # mean direction from which nine tenths of the motion go one way
-ROUNDING = 1e-9  # of the force: smaller gains of columns of unit size are none
-SMOOTHED = 5  # blocks, over which the force at rest is averaged before its peak is taken
-MORE = 1.05  # times the Coulomb friction, from which static friction is more than a peak's noise
-BREAKAWAYS = 5  # that tell a static friction
 NAMES = ("mass", "coulomb", "viscous", "constant")  # of the first columns; others are of the place
 
 
@@ -74,7 +63,8 @@ class Regression:
     def sure(self, name: str) -> float:
         """A gain that is believed, else 0."""
         at = NAMES.index(name)
-        return float(self.gains[at]) if abs(self.t[at]) > SURE else 0.0
+        sure = 3.0  # t-value from which a value is the logs', and no accident of one of their parts
+        return float(self.gains[at]) if abs(self.t[at]) > sure else 0.0
 
 
 def first_values(motions: Sequence[Motion]) -> FirstValues:
@@ -82,10 +72,13 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
     place = _place(motions)
     for length in LENGTHS:
         columns, force = _rows(motions, length, place)
-        if abs(np.mean(np.sign(columns[1]))) > ONE_WAY:
+        one_way = 0.8  # mean direction from which nine tenths of the motion go one way
+        if abs(np.mean(np.sign(columns[1]))) > one_way:
             columns = _without(columns, "constant")  # it would be the friction of that way
         found = _with_friction(columns, force)
-        least = LEAST_INERTIAL * float(np.std(force)) / max(float(np.std(columns[0])), 1e-300)
+        # of the force's RMS; below, friction that is not known hides the inertia
+        least_inertial = 0.005
+        least = least_inertial * float(np.std(force)) / max(float(np.std(columns[0])), 1e-300)
         mass = found.sure("mass")
         if mass > least:
             break
@@ -93,12 +86,14 @@ def first_values(motions: Sequence[Motion]) -> FirstValues:
     against = 0.0 if mass > least else _with_friction(columns, -force).sure("mass")
     coulomb = found.sure("coulomb")
     static = _static(motions, found, place)
+    # times the Coulomb friction, from which static friction is more than a peak's noise
+    more = 1.05
     return FirstValues(
         mass=mass if mass > least else None,
         coulomb=coulomb,
         viscous=found.sure("viscous"),
         constant=found.sure("constant"),
-        static=static if static is not None and static > MORE * coulomb > 0.0 else None,
+        static=static if static is not None and static > more * coulomb > 0.0 else None,
         reversed=-against if against > least else 0.0,
     )
 
@@ -114,7 +109,8 @@ def friction_left(motions: Sequence[Motion], length: float) -> float:
 def _place(motions: Sequence[Motion]) -> tuple[float, bool]:
     """The middle of the positions, m, and whether the axis turns."""
     position = np.concatenate([m.position for m in motions])
-    return float(position.mean()), motions[0].units.rotary and np.ptp(position) > TURNS
+    turns = 1.0  # rad, from which gravity is a sine of the angle, and no spring
+    return float(position.mean()), motions[0].units.rotary and np.ptp(position) > turns
 
 
 def _of_place(position: Array, place: tuple[float, bool]) -> Array:
@@ -138,7 +134,9 @@ def _rows(
         along = [np.sign(m.velocity), m.velocity, np.ones_like(m.velocity)]
         means = w.mean(np.stack([*along, *_of_place(m.position, place), m.net]))
         columns.append(np.concatenate([w.acceleration(m.velocity)[None], means]))
-        going.append(w.mean(stands(m).astype(float)) < AT_REST)
+        # part of a test function, from which what static friction holds is in its force
+        at_rest = 0.02
+        going.append(w.mean(stands(m).astype(float)) < at_rest)
     rows, kept = np.hstack(columns), np.concatenate(going)
     rows = rows[:, kept] if np.count_nonzero(kept) >= ROWS else rows
     return rows[:-1], rows[-1]
@@ -151,7 +149,8 @@ def _with_friction(columns: Array, force: Array) -> Regression:
         return both
     dry = _regressed(_without(columns, "viscous"), force)
     wet = _regressed(_without(columns, "coulomb"), force)
-    if dry.sure("coulomb") > 0.0 and dry.left < NEARLY * wet.left:
+    nearly = 1.5  # times what viscous friction leaves, up to which Coulomb's is believed
+    if dry.sure("coulomb") > 0.0 and dry.left < nearly * wet.left:
         return dry
     if wet.sure("viscous") > 0.0:
         return wet
@@ -174,7 +173,8 @@ def _regressed(columns: Array, force: Array) -> Regression:
     left = force - gains @ scaled
     scores = np.stack([part.sum(axis=1) for part in np.array_split(scaled * left, BLOCKS, axis=1)])
     variance = np.diag(inverse @ (scores.T @ scores) @ inverse)
-    error = np.sqrt(np.maximum(variance, 0.0)) + ROUNDING * float(np.linalg.norm(force))
+    rounding = 1e-9  # of the force: smaller gains of columns of unit size are none
+    error = np.sqrt(np.maximum(variance, 0.0)) + rounding * float(np.linalg.norm(force))
     return Regression(gains / size, gains / error, rms(left))
 
 
@@ -182,23 +182,21 @@ def _static(
     motions: Sequence[Motion], found: Regression, place: tuple[float, bool]
 ) -> float | None:
     """The friction (N) at which the axis breaks away from rest; None where it seldom does."""
+    smoothed = 5  # blocks, over which the force at rest is averaged before its peak is taken
     needed = []
     for m in motions:
         rest = stands(m)
         driven = m.net - found.gains[0] * m.acceleration - found.gains[3]
         driven = driven - found.gains[4:] @ _of_place(m.position, place)
-        driven = np.convolve(driven, np.ones(SMOOTHED) / SMOOTHED, "same")
-        stood = max(round(STOOD / m.period), SMOOTHED)
+        driven = np.convolve(driven, np.ones(smoothed) / smoothed, "same")
+        # s at rest before a motion begins from rest
+        stood = max(round(0.05 / m.period), smoothed)
         needed += [
             float(np.max(driven[last - stood : last] * np.sign(m.velocity[last])))
             for first, last in stretches(rest)
             if last - first >= stood and last < len(rest)
         ]
-    return float(np.median(needed)) if len(needed) >= BREAKAWAYS else None
-
-
-TEST_FUNCTION = 0.02  # s, over which the acceleration that was reached is averaged
-MARGIN = 0.05  # of the way that was covered, beyond its ends
+    return float(np.median(needed)) if len(needed) >= 5 else None  # that tell a static friction
 
 
 def first_model(
@@ -280,6 +278,7 @@ def _first_axis(
     joint: AxisModel | None,
 ) -> AxisModel:
     """joint: the axis without effects where it is a joint, whose inertia is known."""
+    test_function = 0.02  # s, over which the acceleration that was reached is averaged
     covered, units = excitation(motions, None), motions[0].units
     if found.mass is None and joint is None:
         names = ", ".join(m.name for m in motions)
@@ -294,10 +293,10 @@ def _first_axis(
             "little of the force; give a log with faster changes of speed"
         )
     reached = max(
-        float(np.abs(TestFunction.at_least(TEST_FUNCTION, m.period).acceleration(m.velocity)).max())
+        float(np.abs(TestFunction.at_least(test_function, m.period).acceleration(m.velocity)).max())
         for m in motions
     )
-    margin = MARGIN * covered.travel
+    margin = 0.05 * covered.travel  # of the way that was covered, beyond its ends
     low, high = covered.position_low - margin, covered.position_high + margin
     hardware = Hardware(
         travel=(_shown(low), _shown(high)),
@@ -307,7 +306,7 @@ def _first_axis(
         encoder_noise=_shown(max(m.position_noise for m in motions)),
         velocity=_shown(covered.speed_max),
         acceleration=_shown(reached),
-        jerk=_shown(reached / TEST_FUNCTION),
+        jerk=_shown(reached / test_function),
     )
     effects = _first_effects(found, catalogue, covered, units)
     if joint is not None:

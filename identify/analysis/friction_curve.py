@@ -22,11 +22,8 @@ from identify.estimation.least_squares import minimise
 from twin.errors import InputError
 from twin.signals import Array
 
-PARTS = (1.0, 0.3, 0.1)  # of the start rule's v0, from which the search begins
-SLOWEST = 1e-3  # of the lowest speed, least Stribeck velocity that is tried
 NAMES = ("Fc", "Fs", "v0", "sigma2")
 LINE = ("Fc", "sigma2")
-ALIKE = 0.02  # of a speed, within which two plateaus count as one speed
 
 
 @dataclass(frozen=True)
@@ -75,7 +72,8 @@ def curve_through(speed: Array, friction: Array, samples: Array) -> MapCurve:
     Raises InputError for fewer than two speeds, or no more plateaus than parameters.
     """
     rising = np.sort(speed)
-    speeds = 1 + int(np.sum(np.diff(rising) > ALIKE * rising[1:])) if len(rising) else 0
+    alike = 0.02  # of a speed, within which two plateaus count as one speed
+    speeds = 1 + int(np.sum(np.diff(rising) > alike * rising[1:])) if len(rising) else 0
     if speeds < 2 or len(speed) <= len(LINE):
         raise InputError(
             f"the map holds {len(speed)} plateaus at {speeds} "
@@ -147,13 +145,14 @@ def fit_stribeck(speed: Array, friction: Array, weight: Array | None = None) -> 
     def residual(x: Array) -> Array:
         return np.asarray(scale * (StribeckCurve(*x)(speed) - friction))
 
-    low = np.array([0.0, 0.0, SLOWEST * speed.min(), 0.0])
+    slowest = 1e-3  # of the lowest speed, least Stribeck velocity that is tried
+    low = np.array([0.0, 0.0, slowest * speed.min(), 0.0])
     high = np.array([np.inf, np.inf, 10.0 * speed.max(), np.inf])
     ends = [
         minimise(
             residual, lambda x: scale[:, None] * StribeckCurve(*x).slopes(speed),
             start * (1.0, 1.0, part, 1.0), (low, high),
         ).x
-        for part in PARTS
+        for part in (1.0, 0.3, 0.1)  # of the start rule's v0, from which the search begins
     ]  # fmt: skip
     return StribeckCurve(*min(ends, key=lambda x: float(np.sum(residual(x) ** 2))))

@@ -24,10 +24,6 @@ from twin.model.machine import MachineModel
 from twin.signals import Array
 
 SIGNALS = ("position", "force", "current")  # a velocity has a unit and a sign of its own
-HEAD = 240.0  # s of all joints together, of the log's beginning that tells it
-LEAST_LEFT = 0.01  # of a joint's squared torque: where none leaves as much, all is right
-MOST_TRIED = 8  # joints, those that leave most: each asks for the torques of all joints anew
-LEAST_FALL = 0.5  # product over the joints, below which another assignment is believed
 
 
 def misassigned(model: MachineModel, log: Log) -> str | None:
@@ -35,18 +31,21 @@ def misassigned(model: MachineModel, log: Log) -> str | None:
 
     model: its axes are joints of a mechanism.
     """
-    head = _plain(log.part(0, min(round(HEAD / len(model.joints) / log.period), len(log))))
+    # s of all joints together, of the log's beginning that tells it
+    least_left = 0.01  # of a joint's squared torque: where none leaves as much, all is right
+    head = _plain(log.part(0, min(round(240.0 / len(model.joints) / log.period), len(log))))
     going = [axis for axis in model.joints if moves(head, axis)]
     parts = _left(model, head, going)
-    if max(parts, default=0.0) < LEAST_LEFT:
+    if max(parts, default=0.0) < least_left:
         return None
-    worst = sorted(zip(parts, going, strict=True), reverse=True)[:MOST_TRIED]
+    most_tried = 8  # joints, those that leave most: each asks for the torques of all joints anew
+    worst = sorted(zip(parts, going, strict=True), reverse=True)[:most_tried]
     suspects = [axis for axis in going if axis in {a for _, a in worst}]
     tried = ((_left(model, o, going), said) for o, said in _others(model, head, suspects))
     left, said = min(tried, key=lambda pair: float(pair[0].sum()))
     # Joint by joint, as one whose coupling or friction the model lacks may leave most of all.
-    falls = np.maximum(left, LEAST_LEFT) / np.maximum(parts, LEAST_LEFT)
-    if falls.prod() >= LEAST_FALL:
+    falls = np.maximum(left, least_left) / np.maximum(parts, least_left)
+    if falls.prod() >= 0.5:  # product over the joints, below which another assignment is believed
         return None
     most = int(np.argmin(falls))
     before, after = (100.0 * float(each[most]) ** 0.5 for each in (parts, left))

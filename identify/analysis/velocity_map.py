@@ -31,8 +31,6 @@ from twin.signals import Array, stretches
 
 USED = 0.5  # last part of a plateau, by time, that is averaged
 STEADY = 0.02  # of its velocity, by which a plateau's may change within one test function
-LENGTH = 0.02  # s of the test functions that tell where the velocity is constant
-FEWEST = 32  # blocks that make a plateau: fewer average too little noise
 DIRECTIONS = (1.0, -1.0)
 
 
@@ -102,7 +100,8 @@ def plateaus(motion: Motion) -> list[tuple[int, int]]:
 
     From the end of its first test function to the start of its last, so that no ramp is inside.
     """
-    window = TestFunction.at_least(LENGTH, motion.period)
+    length = 0.02  # s of the test functions that tell where the velocity is constant
+    window = TestFunction.at_least(length, motion.period)
     velocity = window.mean(motion.velocity)
     change = np.abs(window.acceleration(motion.velocity)) * window.length
     moving = np.abs(velocity) > STEADY * np.abs(motion.velocity).max()
@@ -111,7 +110,8 @@ def plateaus(motion: Motion) -> list[tuple[int, int]]:
         (int(first * window.stride) + len(window.weights), int((last - 1) * window.stride))
         for first, last in stretches(steady)
     ]
-    return [(start, end) for start, end in blocks if end - start >= FEWEST]
+    fewest = 32  # blocks that make a plateau: fewer average too little noise
+    return [(start, end) for start, end in blocks if end - start >= fewest]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

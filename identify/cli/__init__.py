@@ -19,8 +19,6 @@ from twin.threads import VARIABLES
 
 __all__ = ["app", "doctor", "loop", "machine", "main"]
 
-OBJECTS = 100_000  # that may be made before cycles among them are sought
-INTERRUPTED = 130  # exit code that typer makes of Ctrl-C, without a word
 ANYTHING = {"ignore_unknown_options": True, "allow_extra_args": True}
 
 
@@ -42,21 +40,22 @@ _moved("selftest", "the self-test", "`make selftest` or `python -m benchmarks se
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
     # One thread for matrices (twin.threads). Read once, as NumPy is imported by a command.
+    interrupted = 130  # exit code that typer makes of Ctrl-C, without a word
     for threads in VARIABLES:
         os.environ.setdefault(threads, "1")
     # Modules are a million objects that stay: to seek cycles among them, again and again while
     # they load, is a fifth of the start.
-    gc.set_threshold(OBJECTS)
+    gc.set_threshold(100_000)  # that may be made before cycles among them are sought
     try:
         _require_no_empty(sys.argv[1:])
         code = _command()(sys.argv[1:] or ["--help"], prog_name="twin", standalone_mode=False)
-        if code == INTERRUPTED:
+        if code == interrupted:
             raise KeyboardInterrupt
     except InputError as error:
         code = fail(str(error))
     except KeyboardInterrupt:
         print("twin: interrupted", file=sys.stderr)
-        code = INTERRUPTED
+        code = interrupted
     except OSError as error:
         code = fail(f"{error.filename}: {error.strerror}; check the name and the permissions")
     except Exception as error:

@@ -16,7 +16,6 @@ NEEDED = (
     "zstandard", "lz4", "ruckig", "typer", "rich", "jinja2", "tomlkit", "threadpoolctl",
 )  # fmt: skip
 FOR_IMPORT = ("h5py", "mcap-protobuf-support", "mcap-ros2-support", "pyarrow", "npTDMS")
-OLDEST = (3, 11)  # Python
 AGAIN = "pip install --upgrade proton-twin"
 
 
@@ -58,9 +57,10 @@ def _twin() -> Line:
 
 
 def _python() -> Line:
+    oldest = (3, 11)  # Python
     version = ".".join(map(str, sys.version_info[:3]))
-    fits = sys.version_info >= OLDEST
-    remedy = None if fits else f"install Python {'.'.join(map(str, OLDEST))} or newer"
+    fits = sys.version_info >= oldest
+    remedy = None if fits else f"install Python {'.'.join(map(str, oldest))} or newer"
     return Line("Python", f"{version}, {sys.executable}", remedy)
 
 

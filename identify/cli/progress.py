@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 FIRST, EVERY = 5.0, 10.0  # s until the first line, and from one to the next
-COUNTED = 1000  # above it a part is told as a percentage
-WIDTH = 30  # of the bar, characters
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class Part:
     def words(self, now: float) -> str:
         """What is done, how much of it, and how long that still takes."""
         words, left = self.what, self.left(now)
-        if self.total > COUNTED:
+        if self.total > 1000:  # above it a part is told as a percentage
             words += f": {100 * self.done // self.total} %"
         elif self.total > 1:
             words += f": {self.done} of {self.total}"
@@ -122,7 +120,8 @@ def _bar(shown: Shown) -> Iterator[None]:
     def drawn() -> Table:
         part, row = shown.part, Table.grid(padding=(0, 1))
         counted = part.total > 1  # what is not only shows that it goes on
-        bar = ProgressBar(part.total if counted else None, part.done, WIDTH, pulse=not counted)
+        width = 30  # of the bar, characters
+        bar = ProgressBar(part.total if counted else None, part.done, width, pulse=not counted)
         row.add_row(bar, str(shown))
         return row
 

@@ -19,7 +19,6 @@ Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
 WINDOWS = 8  # of the shorter of two logs, evenly spaced, that are sought in the longer one
-CROSSED = 32  # of which so many are entered within a window
 READ_IF_LOGGED = ("velocity", "setpoint_position")
 BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
@@ -154,7 +153,7 @@ def _with_motion(position: Array) -> Iterator[tuple[slice, int]]:
     # 1000 cells, into which the range of positions is divided
     entered = np.flatnonzero(np.diff(np.floor(position * (1000.0 / span)))) + 1
     starts = np.linspace(0, len(position) - least, WINDOWS).astype(int)
-    ends = np.searchsorted(entered, starts) + CROSSED - 1
+    ends = np.searchsorted(entered, starts) + 32 - 1  # of which so many are entered within a window
     for start, end in zip(starts, ends, strict=True):
         if end < len(entered):
             moving = int(entered[end])

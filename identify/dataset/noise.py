@@ -39,10 +39,6 @@ from twin.signals import Array, between
 
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 HALF = 0.25  # of the sample rate: beyond, a command has no motion, a measured velocity little noise
-PLAIN = 3.0  # times the reading's noise where the band begins; above it the force's noise shows
-COHERENT = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
-SHOWN = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
-UNTOLD = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +110,8 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
     # Rounding is white in the mean alone: where it has less in the band, it has more below it.
     plain = max(reading, white_rounding(motion.resolution, dt))
-    most = max(force, PLAIN * plain * float(bend[band][0]))
+    # times the reading's noise where the band begins; above it the force's noise shows
+    most = max(force, 3.0 * plain * float(bend[band][0]))
     if force < most:
         force = motion.command_noise
     more, scatter = _folded(motion, frequency[band], power[band], half[band], bend[band])
@@ -151,11 +148,14 @@ def _folded(
     shapes = np.stack([white, bend, -np.sqrt(white * bend)], axis=1)
     level, reading, dip = map(float, fitted_levels(shapes, power))
     coherence = min(0.5 * dip / np.sqrt(level * reading), 1.0) if level * reading else 0.0
-    if coherence < COHERENT:
+    coherent = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
+    if coherence < coherent:
         return 0.0, 0.0
     each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
     folded = max(coherence**2, 0.5) * float(each.mean())  # half, where every other is left out
-    if level <= SHOWN * float(np.median(each)) or motion.command_noise <= UNTOLD * folded:
+    shown = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
+    untold = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
+    if level <= shown * float(np.median(each)) or motion.command_noise <= untold * folded:
         return 0.0, 0.0
     return folded, float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
 

@@ -33,11 +33,6 @@ from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array, between, local_parabola
 
-SCATTER = 0.1  # of a part's RMS, by which its estimate misses it; see tests of the noise floor
-OF_ROUNDING = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
-PIECE = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
-HARMONICS = 8  # that hold 93 % of the power; others are taken as white
-
 _PARTS: WeakKeyDictionary[PreparedLog, dict[tuple[bool, int], tuple[float, float]]]
 _PARTS = WeakKeyDictionary()
 
@@ -135,7 +130,9 @@ def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noi
         "aliasing": size([replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]),
         "force": float(np.sqrt(np.mean([log.force_noise**2 for log in logs]))),
     }
-    errors = dict.fromkeys(parts, SCATTER) | {"rounding": OF_ROUNDING}
+    # of a part's RMS, by which its estimate misses it; see tests of the noise floor
+    of_rounding = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
+    errors = dict.fromkeys(parts, 0.1) | {"rounding": of_rounding}
     errors["aliasing"] += 0.5 * max(n.scatter for n in noises)
     power = sum(size**2 for size in parts.values())
     sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)
@@ -151,11 +148,12 @@ def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:
     In the octave below where test functions pass a quarter of the power: what a model lacks is
     slower.
     """
+    piece = 64  # test functions of a piece, whose spectrum tells what the residual leaves room for
     test = log.test_function
     told = np.count_nonzero(left) / max(len(left), 1)
-    if told * len(left) < PIECE:
+    if told * len(left) < piece:
         return noise
-    frequency, power = median_spectrum(left, PIECE, test.stride * test.period, left == 0.0)
+    frequency, power = median_spectrum(left, piece, test.stride * test.period, left == 0.0)
     response = test.response(log.motion.sample_period, noise.segment)
     passed = np.interp(frequency, noise.frequency, response)
     own = np.interp(frequency, noise.frequency, noise.reading * noise.bend)
@@ -237,7 +235,7 @@ def _tones(log: PreparedLog, white: float, frequency: Array, gain: Array) -> Arr
     """
     strayed, steps = _uneven(log)
     above = np.zeros(len(steps))
-    for k in range(1, HARMONICS + 1):
+    for k in range(1, 8 + 1):  # that hold 93 % of the power; others are taken as white
         share = 6.0 / (np.pi * k) ** 2
         # Noise leaves few of which enough is kept, and these take the time; slower ones are told.
         most = np.log(share / RULE.line_chance) / (2.0 * np.pi * k) ** 2

@@ -30,14 +30,6 @@ from twin.signals import Array, between, cubic_through, usual_size, white_noise
 FEWEST_CYCLES = 20  # over the travel, of an error of the reading
 ENOUGH = 200_000  # samples, whose noise tells that of all
 GATHERED = 0.5  # mean cosine of differences in turns of a step; 0 where they do not gather
-FEWEST = 0.01  # of the samples, at which a reading must change to tell a step
-BINS = 4096  # of differences, in the first three multiples of the coarsest step
-LEAST = 0.01  # share of the differences' variance that a line takes; a weaker one makes no noise
-OUTLIER = 20.0  # times the usual size, to which larger differences are cut
-FINEST_CYCLES = 1 << 18  # over the travel
-SPEEDS = 10  # ranges of speed in which a line over the position is looked for
-ALIKE = 0.02  # largest relative difference of a measured velocity from the rate of the position
-LATEST = 0.01  # s, that it may be late
 
 
 def resolution_of(moved: Array) -> float:
@@ -49,17 +41,19 @@ def resolution_of(moved: Array) -> float:
     gather as well, but beyond the coarsest step that readings tell: where they change at few
     samples only, it is sqrt(7/(2 few)) times their noise.
     """
+    fewest = 0.01  # of the samples, at which a reading must change to tell a step
+    bins = 4096  # of differences, in the first three multiples of the coarsest step
     moved = moved[:ENOUGH]
     noise = float(np.sqrt(np.mean(np.diff(moved, 3) ** 2) / 70.0)) if len(moved) > 3 else 0.0
-    coarsest = noise * np.sqrt(3.5 / FEWEST)
+    coarsest = noise * np.sqrt(3.5 / fewest)
     apart = np.abs(np.diff(moved))
     near = apart[apart < 3.5 * coarsest]
-    if len(near) <= FEWEST * len(apart):
+    if len(near) <= fewest * len(apart):
         return 0.0
-    width = 3.5 * coarsest / (BINS - 1)
-    counts = np.bincount(np.rint(near / width).astype(int), minlength=BINS)
-    gathered = np.fft.rfft(counts, 8 * BINS).real / len(near)
-    cycles = np.asarray(np.fft.rfftfreq(8 * BINS, width))[1:-1]
+    width = 3.5 * coarsest / (bins - 1)
+    counts = np.bincount(np.rint(near / width).astype(int), minlength=bins)
+    gathered = np.fft.rfft(counts, 8 * bins).real / len(near)
+    cycles = np.asarray(np.fft.rfftfreq(8 * bins, width))[1:-1]
     dip = np.minimum.accumulate(gathered)
     back = (gathered - dip) / np.maximum(1.0 - dip, np.finfo(float).eps)
     tops = (back[1:-1] > back[:-2]) & (back[1:-1] >= back[2:]) & (back[1:-1] > GATHERED)
@@ -141,21 +135,24 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
     Only errors larger than those of rounding, and slower than every second step, as readings
     repeat with their steps by themselves.
     """
+    # share of the differences' variance that a line takes; a weaker one makes no noise
+    least = 0.01
     readings = readings[:ENOUGH]
     step = resolution_of(np.diff(readings))
     place, bend = readings[2:-2], np.diff(readings, 4)
     usual = usual_size(bend)
-    bend = np.clip(bend, -OUTLIER * usual, OUTLIER * usual)
+    outlier = 20.0  # times the usual size, to which larger differences are cut
+    bend = np.clip(bend, -outlier * usual, outlier * usual)
     if not bend.any() or not (span := float(np.ptp(place))):
         return ()
     # Of more cycles than a few times the samples, some fit by chance.
-    cycles = min(FINEST_CYCLES, 16 * len(bend))
+    cycles = min(1 << 18, 16 * len(bend))  # over the travel
     finest = min(cycles / span, 0.5 / step if step else np.inf)
     found: list[float] = []
     for _ in range(MOST_LINES):
-        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest, LEAST)
+        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest, least)
         chance = np.log(cycles) + 0.5 * len(bend) * np.log1p(-min(share, 0.5))
-        if share < LEAST or chance > np.log(RULE.line_chance):
+        if share < least or chance > np.log(RULE.line_chance):
             break
         bends = np.diff(_waves(readings, 1.0 / frequency), 4, axis=0)
         gains = _gains(bends, bend)
@@ -192,10 +189,11 @@ def _at_every_speed(readings: Array, bend: Array, made: Array, noise: float) -> 
     Of those in which it would be missed. made: (n - 4,) m, its part of the differences. noise: m,
     their usual size.
     """
+    speeds = 10  # ranges of speed in which a line over the position is looked for
     speed = np.abs(readings[4:] - readings[:-4])
-    among = np.minimum((SPEEDS / speed.max() * speed).astype(int), SPEEDS - 1)
-    power = np.bincount(among, made**2, SPEEDS)
-    found = np.bincount(among, made * bend, SPEEDS)
+    among = np.minimum((speeds / speed.max() * speed).astype(int), speeds - 1)
+    power = np.bincount(among, made**2, speeds)
+    found = np.bincount(among, made * bend, speeds)
     sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.line_chance)
     shown = power > (sure * noise) ** 2
     return bool(shown.sum() > 1 and np.median(found[shown] / power[shown]) > 0.5)
@@ -225,7 +223,9 @@ def together(position: Array, velocity: Array | None, period: float) -> tuple[Ar
     look = TestFunction.at_least(LOOK, period)
     columns = np.stack([look.mean(mean), look.acceleration(mean)], axis=1)
     gain, late = np.linalg.lstsq(columns, look.mean(rate), rcond=None)[0]
-    if abs(gain - 1.0) > ALIKE or abs(late) > LATEST:
+    alike = 0.02  # largest relative difference of a measured velocity from the rate of the position
+    latest = 0.01  # s, that it may be late
+    if abs(gain - 1.0) > alike or abs(late) > latest:
         return position, 0.0
     at = np.arange(len(mean), dtype=float)
     on_time = gain * np.interp(at + late / gain / period, at, mean)

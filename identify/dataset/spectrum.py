@@ -29,7 +29,6 @@ from twin.signals import Array
 MOST_LINES = 24
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 BAND = 20  # resolutions whose median tells the level of the spectrum
-ROUNDS, RESTING = 12, 1e-4  # of least squares, at most; the relative change of levels that rest
 
 
 def pieces_of(signal: NDArray[Any], samples: int) -> NDArray[Any]:
@@ -84,13 +83,14 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
     """
     least = np.maximum(np.minimum.accumulate(power[::-1])[::-1], np.finfo(float).tiny)
     model, levels = least, np.zeros(shapes.shape[1])
-    for _ in range(ROUNDS):
+    rounds, resting = 12, 1e-4  # of least squares, at most; the relative change of levels that rest
+    for _ in range(rounds):
         # A frequency whose log of power over fit is 0.5 has half its weight
         above = np.maximum(np.log(power / model), 0.0) / 0.5
         weight = 1.0 / (1.0 + above**2)
         before = levels
         levels = _not_negative(shapes * (weight / model)[:, None], power / model * weight)
-        if (np.abs(levels - before) <= RESTING * before).all():
+        if (np.abs(levels - before) <= resting * before).all():
             break
         model = np.maximum(shapes @ levels, least[0])
     return levels

@@ -21,7 +21,6 @@ from twin.signals import Array
 
 TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
 QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
-SHOWS = 2.0  # times the noise floor, and the power at a quiet length, from which a force shows
 FOREIGN = 10.0  # times the RMS of what is left of the force later on
 HELD = 0.1  # of the force itself
 
@@ -46,7 +45,9 @@ class Scale:
 
     def shows_more_than(self, quiet: Scale) -> bool:
         """Whether it holds a force, sure beside its noise, that a quieter scale hides."""
-        return self.left > SHOWS * self.floor and self.structure**2 > SHOWS * quiet.structure**2
+        # times the noise floor, and the power at a quiet length, from which a force shows
+        shows = 2.0
+        return self.left > shows * self.floor and self.structure**2 > shows * quiet.structure**2
 
     @classmethod
     def of(cls, length: float, motions: Motions) -> Scale:

@@ -28,8 +28,6 @@ from twin.model.units import LINEAR
 
 Array = NDArray[np.float64]
 
-SAME_FORCE = 0.01  # largest part of that force outside the span of an effect with the same force
-
 
 @dataclass(frozen=True)
 class Change:
@@ -105,7 +103,9 @@ def _alike(fit: Fit, catalogue: Catalogue, forces: Sequence[Array]) -> list[tupl
 
     def is_made(force: Array, basis: Array) -> bool:
         left = np.linalg.norm(unabsorbed(force[: len(basis)], basis))
-        return bool(left < SAME_FORCE * np.linalg.norm(force))
+        # largest part of that force outside the span of an effect with the same force
+        same_force = 0.01
+        return bool(left < same_force * np.linalg.norm(force))
 
     for effect in _linear_effects(fit, catalogue) if forces else ():
         begun = orthonormal(_columns(fit, effect, [head])[first])

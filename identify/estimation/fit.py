@@ -29,8 +29,6 @@ from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 
 MOST_EVALUATIONS = 40
-PRIOR_SPREAD = 3.0  # standard deviation of the prior on a logarithm, about a factor 20, and of
-# static friction beyond the Coulomb friction over that
 LINES = 6  # of a spectrum that are looked at, the surest first
 
 
@@ -342,6 +340,9 @@ class FitProblem:
         left: of the residual (n,) N at these variables, all or a part. Returns its effective sample
         size.
         """
+        # standard deviation of the prior on a logarithm, about a factor 20, and of static friction
+        # beyond the Coulomb friction over that
+        prior_spread = 3.0
         axis = self.scaling.outside(self.axis, internal)
         inertia = axis.mass * np.concatenate([log.acceleration for log in self.logs])
         command = np.concatenate([log.command for log in self.logs])
@@ -359,10 +360,10 @@ class FitProblem:
         unseen = self.added & (size < 1e-3 * alike)
         self.centre = np.where(unseen, self.start, self.neutral)
         self.pull = np.where(self.added, noise * np.where(unseen, alike, size) / expected, 0.0)
-        self.pull[self.scaling.is_logarithm() & ~self.added] = noise / PRIOR_SPREAD
+        self.pull[self.scaling.is_logarithm() & ~self.added] = noise / prior_spread
         least = self.scaling.least(axis)
         beyond = self.excess & (least > 0.0)
-        self.pull[beyond] = noise / (PRIOR_SPREAD * least[beyond])
+        self.pull[beyond] = noise / (prior_spread * least[beyond])
         return samples
 
     def _constant_slopes(self) -> Array:

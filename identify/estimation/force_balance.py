@@ -40,7 +40,6 @@ _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
 STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
-AT_ONCE = 500_000  # forces of several sets of parameters that are held until they are averaged
 
 
 def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -348,7 +347,8 @@ def _together(
     """The change by sets (m, p) of the table's parameters in one walk; absent: from no force."""
     motion = _driven(group, log, axis)[0]
     unmoved = 0.0 if absent else total_forces(table, table.parameters[None], motion)
-    at_once = max(AT_ONCE // motion.signals.shape[1], 1)
+    # forces of several sets of parameters that are held until they are averaged
+    at_once = max(500_000 // motion.signals.shape[1], 1)
     means = []
     for i in range(0, len(sets), at_once):
         forces = total_forces(table, sets[i : i + at_once], motion)

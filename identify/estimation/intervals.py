@@ -33,8 +33,6 @@ from twin.signals import Array
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
 CONFIDENCE = 1.0 - 2.0 * RULE.chance  # as the truth may be off to either side
 QUANTILE = students_t(RULE.chance, BLOCKS - 1)
-AT_ONCE = 16  # estimates whose influences are held, as many are as large as the Jacobian
-GROUPS = 10  # of like influence; wide, as a law differs from the machine's over wide stretches
 FAR = 4.0  # half widths to either side at which the error must have risen
 # Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
 # missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
@@ -235,7 +233,8 @@ def half_widths_by(jacobian: Array, residual: Array, weights: Array) -> Array:
     variance = np.einsum("ij,ik,kj->j", own, covariance, own)
     over_time = QUANTILE * np.sqrt(np.maximum(variance, 0.0))
     weighed = inverse @ own
-    pieces = (weighed[:, k : k + AT_ONCE] for k in range(0, weighed.shape[1], AT_ONCE))
+    at_once = 16  # estimates whose influences are held, as many are as large as the Jacobian
+    pieces = (weighed[:, k : k + at_once] for k in range(0, weighed.shape[1], at_once))
     influences = (column for piece in pieces for column in (columns @ piece).T)
     over_influence = np.array([_by_influence(column, residual) for column in influences])
     out[known] = np.maximum(over_time, over_influence) + shift
@@ -249,15 +248,16 @@ def _by_influence(influence: Array, residual: Array) -> float:
     equal share of the squared influence, which is what the data tell of the estimate with the other
     parameters held. So all groups count alike, and the fit takes as much from each (CR2).
     """
+    groups = 10  # of like influence; wide, as a law differs from the machine's over wide stretches
     size = np.abs(influence)
     told = np.sort(size) ** 2
     whole = told.sum() or 1.0  # of a sum of no parameters
-    first = np.searchsorted(np.cumsum(told) - 0.5 * told, whole * np.arange(1, GROUPS) / GROUPS)
+    first = np.searchsorted(np.cumsum(told) - 0.5 * told, whole * np.arange(1, groups) / groups)
     edges = np.sqrt(told[np.minimum(first, len(size) - 1)])
     group = np.count_nonzero(size >= edges[:, None], axis=0)
-    left = np.maximum(1.0 - np.bincount(group, size**2, GROUPS) / whole, ROUNDING)
-    moved = np.bincount(group, influence * residual, GROUPS)
-    return students_t(RULE.chance, GROUPS - 1) * float(np.sqrt((moved**2 / left).sum()))
+    left = np.maximum(1.0 - np.bincount(group, size**2, groups) / whole, ROUNDING)
+    moved = np.bincount(group, influence * residual, groups)
+    return students_t(RULE.chance, groups - 1) * float(np.sqrt((moved**2 / left).sum()))
 
 
 def _held(fit: Fit) -> list[Estimate]:

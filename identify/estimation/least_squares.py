@@ -21,11 +21,9 @@ import numpy as np
 
 from twin.signals import Array
 
-FIRST_DAMPING = 1e-2
 MOST_EVALUATIONS = 100  # of a search that is only to end
 RIDGE = 1e-4  # of a column's length, which keeps what is not excited, or explained twice, finite
 ROUNDING = 1e-12  # of a sum of squares: what thousands of terms of rounding leave of nothing
-ROWS = 1 << 10  # that a secant changes at once
 EXACT = float(np.finfo(float).eps)  # relative fall of a sum of squares that is none
 
 
@@ -52,11 +50,12 @@ def minimise(
     the residual at the start is not finite, the start is returned as not converged. jacobian: may
     overwrite what it gave before; nobody else does.
     """
+    first_damping = 1e-2
     low, high = bounds
     x = np.clip(start, low, high)
     force = residual(x)
     cost = float(force @ force)
-    damping, most_damping = FIRST_DAMPING, 1.0 / np.sqrt(EXACT)
+    damping, most_damping = first_damping, 1.0 / np.sqrt(EXACT)
     if not np.isfinite(cost):
         return Solution(x, False)
     columns, exact = jacobian(x), True
@@ -83,7 +82,7 @@ def minimise(
         elif not exact:
             del columns
             columns, exact = jacobian(x), True
-        elif damping <= FIRST_DAMPING and _cost(force + columns @ step) > (1.0 - tolerance) * cost:
+        elif damping <= first_damping and _cost(force + columns @ step) > (1.0 - tolerance) * cost:
             return Solution(x, True)  # nearly undamped and not cut at bounds, it promises no more
         else:
             damping *= 10.0
@@ -106,8 +105,9 @@ def _follow(columns: Array, step: Array, change: Array) -> None:
     if size == 0.0:
         return
     gains = (change - columns @ step) / size
-    for first in range(0, len(gains), ROWS):  # the columns of a fit are most of its memory
-        at = slice(first, first + ROWS)
+    rows = 1 << 10  # that a secant changes at once
+    for first in range(0, len(gains), rows):  # the columns of a fit are most of its memory
+        at = slice(first, first + rows)
         columns[at] += np.outer(gains[at], weighed)
 
 

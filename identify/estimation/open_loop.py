@@ -115,7 +115,6 @@ def open_loop(
 
 
 LEAST_READING = 1e-9  # m, below which no reading is trusted
-PLACES = 50  # along a log, at which the usual size of a state is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +151,8 @@ def measured_beginning(axis: AxisModel, log: PreparedLog) -> tuple[Beginning, Ar
     x, v, _ = local_cubic(around, period)
     unit = [local_cubic(row, period)[:2] for row in np.eye(2 * side + 1)]
     surely = reading * np.linalg.norm(np.array(unit, dtype=float), axis=0)
-    places = np.linspace(side, len(position) - 1, PLACES).astype(np.int64)
+    # along a log, at which the usual size of a state is seen
+    places = np.linspace(side, len(position) - 1, 50).astype(np.int64)
     along = states_along(table, position[:, None], run.command[:, None], period, places, 0.0, False)
     usual = np.sqrt(np.mean(along**2, axis=0)) * _of_friction(axis, table)
     return Beginning(side, float(x), float(v), along[0]), np.concatenate([surely, usual])

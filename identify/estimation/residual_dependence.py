@@ -26,7 +26,6 @@ from twin.signals import Array
 
 BINS = (24, 96, 384)  # numbers of bins along a coordinate
 SAME_PERIOD = 0.02  # relative difference, or of a turn, within which two are one
-SAME = 0.5  # difference of two terms over the larger, below which they are one
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,8 @@ class Repeat:
         """Whether one sine of position holds for all logs."""
         terms = [a * np.exp(1j * self.phase[n]) for n, a in self.amplitude.items()]
         size = max(self.amplitude.values())
-        return all(abs(t - terms[0]) < SAME * size for t in terms)
+        same = 0.5  # difference of two terms over the larger, below which they are one
+        return all(abs(t - terms[0]) < same * size for t in terms)
 
 
 def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:

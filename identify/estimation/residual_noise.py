@@ -39,8 +39,6 @@ HATS = 16  # knots of a curve over a coordinate; finer ones would learn the nois
 MOVED = ("velocity", "acceleration", "direction")
 CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
 SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
-ALIKE = 1.5  # times the error of the training logs that noise may have on others
-GAUSSIAN, LAPLACE = 3.0, 6.0  # kurtosis of these noises
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +151,7 @@ class Remainder:
 
 def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
+    gaussian, laplace = 3.0, 6.0  # kurtosis of these noises
     logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once foretells nothing
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
     # 0.5 of the force, RMS: a larger rest is of another machine
@@ -161,14 +160,15 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     trim_memory()  # matrices of all logs follow
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
-    least = GAUSSIAN - SURE * np.sqrt(24.0 / effective_samples(rest.force))
+    least = gaussian - SURE * np.sqrt(24.0 / effective_samples(rest.force))
     if kurtosis < least or rest.is_foretold() or rest.has_line():
         return False
     if fit.noise.follows_motion:
         return True
-    if kurtosis > LAPLACE:
+    if kurtosis > laplace:
         return False
-    larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > ALIKE * fit.error
+    alike = 1.5  # times the error of the training logs that noise may have on others
+    larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > alike * fit.error
     return not larger and not rest.size_is_foretold()
 
 

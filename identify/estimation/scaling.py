@@ -23,7 +23,6 @@ from twin.signals import Array
 
 Limits = tuple[float, float]
 
-DECADES = 1e9  # a scale is sought within this factor of what is usual, as good as everywhere
 AT_EDGE = float(np.sqrt(np.finfo(float).eps))  # of a bound, within which a value is at it
 
 
@@ -32,13 +31,14 @@ def limits_of(p: Parameter, value: float, scale: Scale) -> Limits:
 
     The value itself is always allowed.
     """
+    decades = 1e9  # a scale is sought within this factor of what is usual, as good as everywhere
     if p.lower <= 0.0 or p.at_least is not None or not has_size(p.unit):
         return p.lower, p.upper
     force, length, _ = dimension(p.unit)
     usual = scale.size(p.unit)
     # 4 times the travel or the top speed: what is longer or faster shows as a constant
-    most = 4.0 if (force, length) == (0, 1) else DECADES
-    low, high = max(p.lower, usual / DECADES), min(p.upper, usual * most)
+    most = 4.0 if (force, length) == (0, 1) else decades
+    low, high = max(p.lower, usual / decades), min(p.upper, usual * most)
     return min(low, value), max(high, value)
 
 

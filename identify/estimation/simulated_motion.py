@@ -37,15 +37,9 @@ from twin.errors import InputError
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
-STARTS = 4  # of the search: the axis as given, and places around it
 AROUND = 0.1  # standard deviation of those, in parts of each value
 FIRST_EVALUATIONS = 10  # of the search from each, after which the best goes on with all
-PROBE = 1e-2  # of the error, by which a difference step should change the position
-FIRST_STEP = 1e-4  # of a value
 TOLERANCE = 1e-6  # relative fall of the squared error, below which the search ends
-ROUGH = 100.0  # times the noise of the readings, above which the error is the model's, and rough
-AT_BOUND = 2.0  # from a bound a logarithm this near is not taken as a start
-SEED = 0  # of the places around
 OF_OTHER_AXIS = ("X_OTHER", "V_OTHER", "A_OTHER")
 
 
@@ -91,8 +85,9 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
     InputError where an effect depends on the other axis, or no start gives a finite motion.
     """
     problem = _Problem(axis, logs)
-    rng = np.random.default_rng(SEED)
-    starts = [problem.start, *(problem.around(rng) for _ in range(STARTS - 1))]
+    rng = np.random.default_rng(0)  # of the places around
+    # of the search: the axis as given, and places around it
+    starts = [problem.start, *(problem.around(rng) for _ in range(4 - 1))]
     tried = [problem.solve(problem.begun_well(start), FIRST_EVALUATIONS) for start in starts]
     costs = [problem.cost(s.x) for s in tried]
     if not np.isfinite(costs).any():
@@ -140,7 +135,7 @@ class _Problem:
         sizes = np.where(self.scaling.is_logarithm(), 1.0, np.abs(self.start[: len(low)]))
         usual = [abs(c.parameter.start) or 1.0 for c in self.scaling.where]
         self.sizes = np.where(sizes > 0.0, sizes, usual)
-        self.steps = np.r_[FIRST_STEP * self.sizes, begun + 1.0]
+        self.steps = np.r_[1e-4 * self.sizes, begun + 1.0]  # of a value
         self.weight = 0.0
         self.weigh(self.start, white=True)
 
@@ -152,7 +147,7 @@ class _Problem:
         out = internal.copy()
         edge = np.minimum(internal - self.bounds[0], self.bounds[1] - internal)
         for i in np.flatnonzero(self.scaling.is_logarithm()):
-            if edge[i] < AT_BOUND:
+            if edge[i] < 2.0:  # from a bound a logarithm this near is not taken as a start
                 out[i] = np.log(self.scaling.where[i].parameter.start)
         return out
 
@@ -185,7 +180,9 @@ class _Problem:
     def is_rough(self, internal: Array) -> bool:
         """Whether the error is far above what the noise of the readings makes."""
         readings = [max(log.motion.position_noise, LEAST_READING) for log in self.logs]
-        return self.error(internal) > ROUGH * max(readings)
+        # times the noise of the readings, above which the error is the model's, and rough
+        rough = 100.0
+        return self.error(internal) > rough * max(readings)
 
     def searched(self, internal: Array, rng: np.random.Generator) -> Array:
         """The same with the parameters of the least error around, the beginnings as they are."""
@@ -236,7 +233,8 @@ class _Problem:
         """Differences (n, k) by steps that change the position by a small part of its error."""
         base = self.rows(internal)
         out = np.empty((len(base), len(internal)))
-        wanted = PROBE * max(rms(base), LEAST_READING)
+        probe = 1e-2  # of the error, by which a difference step should change the position
+        wanted = probe * max(rms(base), LEAST_READING)
         for i in range(len(internal)):
             for _ in range(4):  # tries to find such a step
                 step = self.steps[i]
@@ -287,13 +285,6 @@ def _require_alone(axis: AxisModel, logs: Sequence[PreparedLog]) -> None:
             )
 
 
-POPULATION, MOST_POPULATION = 12, 72  # for each variable, and of all
-GENERATIONS = 60  # at most
-ALIKE = 1e-3  # scatter of the population's errors, in parts of their mean, at which it ends
-REACH = 5.0  # standard deviations of the population, beyond which nothing is tried
-SIMPLEX_EVALUATIONS = 600  # at most
-
-
 def rough_minimum(
     error: Callable[[Array], float],
     start: Array,
@@ -306,22 +297,26 @@ def rough_minimum(
     spread (k,): standard deviation of the population around the start. Where the error is not
     finite the variables are not taken.
     """
+    reach = 5.0  # standard deviations of the population, beyond which nothing is tried
     from scipy.optimize import differential_evolution, minimize
 
     def finite(x: Array) -> float:
         found = error(x)
         return found if np.isfinite(found) else np.inf
 
-    low = np.maximum(bounds[0], start - REACH * spread)
-    high = np.minimum(bounds[1], start + REACH * spread)
-    size = (min(POPULATION * len(start), MOST_POPULATION), len(start))
+    low = np.maximum(bounds[0], start - reach * spread)
+    high = np.minimum(bounds[1], start + reach * spread)
+    population, most_population = 12, 72  # for each variable, and of all
+    size = (min(population * len(start), most_population), len(start))
     first = np.clip(start + spread * rng.standard_normal(size), low, high)
     first[0] = start
+    generations = 60  # at most
+    alike = 1e-3  # scatter of the population's errors, in parts of their mean, at which it ends
     found = differential_evolution(
-        finite, list(zip(low, high, strict=True)), init=first, maxiter=GENERATIONS, tol=ALIKE,
+        finite, list(zip(low, high, strict=True)), init=first, maxiter=generations, tol=alike,
         polish=False, rng=rng,
     ).x  # fmt: skip
-    options = {"maxfev": SIMPLEX_EVALUATIONS}
+    options = {"maxfev": 600}  # at most
     polished = minimize(
         finite, found, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
         options=options,

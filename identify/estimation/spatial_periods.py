@@ -17,10 +17,6 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from twin.signals import Array
 
 FEWEST_CYCLES = 3  # over the travel
-MOST_CYCLES = 120  # over the travel, of the first look
-MOST_PEAKS = 6
-MOST_LINES = 3
-AT_ONCE = 32  # waves that are held; all of them take 45 MB
 
 
 def spatial_periods(
@@ -39,7 +35,7 @@ def spatial_periods(
     highest = 0.25 * len(position) / span
     found = find_lines(
         [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
-        most=MOST_LINES, chance=1.0,  # false-alarm probability up to which a line is tried
+        most=3, chance=1.0,  # false-alarm probability up to which a line is tried
     )  # fmt: skip
     lines = (line.period for line in found)
     apart = [p for p in lines if all(abs(span / p - span / q) > 0.5 for q in peaks)]
@@ -50,14 +46,14 @@ def _peaks(
     position: Array, force: Array, weight: Array, columns: Array, span: float
 ) -> tuple[float, ...]:
     """Pitches (m) at which a sine gains more than at those beside, the largest gains first."""
-    halves = np.arange(2 * FEWEST_CYCLES, 2 * MOST_CYCLES + 1)
+    halves = np.arange(2 * FEWEST_CYCLES, 2 * 120 + 1)  # over the travel, of the first look
     basis = orthonormal(columns)
     left = unabsorbed(force, basis)
     waves = _waves(np.exp(1j * np.pi / span * position), halves[0], len(halves))
     gain = np.concatenate([_gains(weight[:, None] * some, left, basis) for some in waves])
     beside = np.pad(gain, 1)
     tops = np.flatnonzero((gain >= beside[:-2]) & (gain >= beside[2:]))
-    best = tops[np.argsort(-gain[tops])][:MOST_PEAKS]
+    best = tops[np.argsort(-gain[tops])][:6]  # as many are tried
     return tuple(float(2.0 * span / k) for k in halves[best])
 
 
@@ -66,8 +62,9 @@ def _waves(
 ) -> Iterator[NDArray[np.complex128]]:
     """Powers (n, k) of turns (n,) from the first on, some at a time."""
     wave = turn**first
-    for k in range(0, count, AT_ONCE):
-        out = np.empty((min(AT_ONCE, count - k), len(turn)), dtype=complex)
+    at_once = 32  # waves that are held; all of them take 45 MB
+    for k in range(0, count, at_once):
+        out = np.empty((min(at_once, count - k), len(turn)), dtype=complex)
         for row in out:
             row[:], wave = wave, wave * turn
         yield out.T

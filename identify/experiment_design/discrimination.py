@@ -42,8 +42,6 @@ from twin.progress import Progress, silent
 from twin.signals import Array
 from twin.simulator import quickest
 
-SEED = 0  # of the random moves and the noise; `twin simulate` draws the same moves by default
-
 
 @dataclass(frozen=True)
 class Explanation:
@@ -114,7 +112,9 @@ class Arena:
         hardly moves or not for long, and where it moves too slowly for the test function.
         """
         truth_machine = self.machine.with_axis(self.name, truth.axis)
-        log = simulate(truth_machine, experiment, seed=SEED, simulator=quickest(self.machine))
+        # of the random moves and the noise; `twin simulate` draws the same moves by default
+        seed = 0
+        log = simulate(truth_machine, experiment, seed=seed, simulator=quickest(self.machine))
         require_within_limits(truth_machine, log)
         if len(log) * log.period < SHORTEST_LOG or not moves(log, self.name):
             raise CannotRun(

@@ -13,10 +13,6 @@ from identify.dataset.prepared_log import PreparedLog, stands
 from twin.model.units import LINEAR
 from twin.signals import Array
 
-HEART = (0.25, 0.75)  # quantiles of the squared difference that bound the range of a feature
-SELDOM = 0.01  # share of the data below which all motions count as equally rare
-DUST = 1e-5  # of the axis' own motion, below which the other axis is at rest
-RARE = 0.05  # share of the data below which a motion counts as missing
 OTHER = " of the other axis"
 
 
@@ -37,7 +33,8 @@ class Gap:
     @property
     def missing(self) -> bool:
         """Whether the data have hardly any of this motion."""
-        return self.share is not None and self.share < RARE
+        rare = 0.05  # share of the data below which a motion counts as missing
+        return self.share is not None and self.share < rare
 
 
 UNITS = {  # of a linear axis, of the properties of a motion that tell explanations apart
@@ -104,10 +101,12 @@ def most_missed(
         low, high = _weighted_quantiles(values, where)
         # Of another axis, values up to what a closed loop makes of one at rest are none.
         own = planned[name.removesuffix(OTHER)].max() if name.endswith(OTHER) else 0.0
-        if not high > 0.0 or high < DUST * own:
+        dust = 1e-5  # of the axis' own motion, below which the other axis is at rest
+        if not high > 0.0 or high < dust * own:
             continue
         share = _inside(data[name], low, high) if data else None
-        missed = 1.0 if share is None else share + SELDOM
+        seldom = 0.01  # share of the data below which all motions count as equally rare
+        missed = 1.0 if share is None else share + seldom
         found.append((missed * _inside(values, low, high), (name, low, high, share)))
     return min(found, key=lambda pair: pair[0])[1]
 
@@ -117,7 +116,8 @@ def _weighted_quantiles(values: Array, weights: Array) -> tuple[float, float]:
     total = np.cumsum(weights[order])
     if not total[-1] > 0.0:
         return float(values.min()), float(values.max())
-    low, high = np.searchsorted(total, np.array(HEART) * total[-1])
+    heart = (0.25, 0.75)  # quantiles of the squared difference that bound the range of a feature
+    low, high = np.searchsorted(total, np.array(heart) * total[-1])
     return float(values[order[low]]), float(values[order[min(high, len(order) - 1)]])
 
 

@@ -46,10 +46,6 @@ from twin.parallel import parallel
 from twin.progress import Progress, silent, within
 
 DURATION = 20.0  # s of a planned experiment
-NEXT_DURATION = 10.0  # s of the one that a diagnosis proposes
-VERIFIED = 6  # experiments at most that are judged again by full refits
-NEXT_VERIFIED = 2  # the same for the one that a diagnosis proposes
-MOST_RIVALS = 3  # explanations that a diagnosis asks one experiment to separate
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +117,8 @@ def plan(
     dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
     arena = _arena(model, dataset, bool(logs), between, catalogue, test_function, progress)
     effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
-    return _planned(arena, duration, VERIFIED, not logs, effects, progress)
+    verified = 6  # experiments at most that are judged again by full refits
+    return _planned(arena, duration, verified, not logs, effects, progress)
 
 
 def next_experiments(
@@ -141,7 +138,9 @@ def next_experiments(
         arena = _between_candidates(model, some, rivals, test_function)
         effects = {c.effect.name: c.effect for c in rivals}
         try:
-            plans[axis] = _planned(arena, NEXT_DURATION, NEXT_VERIFIED, False, effects)
+            next_duration = 10.0  # s of the one that a diagnosis proposes
+            next_verified = 2  # the same for the one that a diagnosis proposes
+            plans[axis] = _planned(arena, next_duration, next_verified, False, effects)
         except CannotRun as why:
             not_planned[axis] = str(why)
     return plans, not_planned
@@ -257,7 +256,8 @@ def _rivals(found: AxisDiagnosis) -> list[Candidate]:
     )  # fmt: skip
     level = {t.change.name: t.candidate for t in step.level}
     others = [level[name] for name in found.ambiguous_with if name in level]
-    return [step.tried.candidate, *others][:MOST_RIVALS]
+    most_rivals = 3  # explanations that a diagnosis asks one experiment to separate
+    return [step.tried.candidate, *others][:most_rivals]
 
 
 def _between_candidates(

@@ -26,9 +26,6 @@ from twin.model.parameters import free_parameters, read, write
 from twin.signals import Array, rate
 
 SPREAD = 0.2  # relative spread of a machine's values about the model's
-SHAPE_SPREAD = 0.3  # of the logarithm of nonlinear parameters that are not scanned
-HALVINGS = 12  # to within a hundredth
-TINY = 1e-300
 
 
 def other_machine(axis: AxisModel, rng: np.random.Generator) -> AxisModel:
@@ -74,7 +71,8 @@ def _drawn_shape(
         if low > 0:
             return float(np.exp(rng.uniform(np.log(low), np.log(high))))
         return float(rng.uniform(low, high))
-    drawn = start * float(np.exp(SHAPE_SPREAD * rng.uniform(-1.0, 1.0)))
+    shape_spread = 0.3  # of the logarithm of nonlinear parameters that are not scanned
+    drawn = start * float(np.exp(shape_spread * rng.uniform(-1.0, 1.0)))
     return min(max(drawn, p.lower), p.upper)
 
 
@@ -118,10 +116,11 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
     """
 
     def error(log_scale: float) -> float:
-        return float(np.log(max(size(float(np.exp(log_scale))), TINY) / max(wanted, TINY)))
+        tiny = 1e-300  # no logarithm of nothing
+        return float(np.log(max(size(float(np.exp(log_scale))), tiny) / max(wanted, tiny)))
 
     low, high, risen = float(np.log(1e-9)), float(np.log(1e9)), False
-    for _ in range(HALVINGS):
+    for _ in range(12):  # to within a hundredth
         middle = 0.5 * (low + high)
         if error(middle) < 0.0:
             low = middle
@@ -161,8 +160,6 @@ def added_force(
     return np.asarray(axis.mass * np.concatenate(rates))
 
 
-PERIOD = 1e-3  # s
-REACH = 0.15  # m
 FORCE = 0.1  # N RMS of the drawn effect
 MASS = 10.0  # kg
 VISCOUS = "sigma2"  # viscous friction, N s/m, of every friction of the catalogue
@@ -170,20 +167,21 @@ VISCOUS = "sigma2"  # viscous friction, N s/m, of every friction of the catalogu
 
 def exemplary_motion() -> Motion:
     """Passes over the travel in both directions, ever slower, with the command for 10 kg."""
+    period = 1e-3  # s
     parts = []
     for half in (1.5, 3.0, 6.0):  # s for one way
-        t = np.arange(0.0, 2.0 * half, PERIOD)
-        parts.append(-REACH * np.cos(np.pi * t / half))
+        t = np.arange(0.0, 2.0 * half, period)
+        parts.append(-0.15 * np.cos(np.pi * t / half))  # m
     position = np.concatenate(parts)
-    velocity = rate(position, PERIOD)
-    command = MASS * rate(velocity, PERIOD) + 0.3 * np.sign(velocity)
+    velocity = rate(position, period)
+    command = MASS * rate(velocity, period) + 0.3 * np.sign(velocity)
     other = 0.5 * np.roll(position, len(position) // 7)
-    speed = rate(other, PERIOD)
-    others = np.stack([other, speed, rate(speed, PERIOD)])
+    speed = rate(other, period)
+    others = np.stack([other, speed, rate(speed, period)])
     signals = np.stack([position, velocity, command])
     return Motion(
         name="exemplary", axis="x", track=Blocks(signals, signals[1:]), others=others,
-        period=PERIOD, start=0.0, sample_period=PERIOD, position_noise=0.0,
+        period=period, start=0.0, sample_period=period, position_noise=0.0,
     )  # fmt: skip
 
 

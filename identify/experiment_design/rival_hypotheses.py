@@ -25,7 +25,6 @@ from twin.signals import Array
 from twin.simulator import quickest
 
 STRENGTH = 10.0  # times the noise floor: assumed force of an effect when there are no logs
-SIMULATED = 10.0  # s of simulated tracking on which such an effect is scaled to that force
 
 Rival = Effect | MachineModel
 
@@ -35,7 +34,8 @@ def simulated_dataset(machine: MachineModel, axis: str) -> Dataset:
 
     Raises CannotRun where the drive does not move the axis.
     """
-    log = simulate(machine, Tracking(SIMULATED), seed=0, simulator=quickest(machine))
+    simulated = 10.0  # s of simulated tracking on which such an effect is scaled to that force
+    log = simulate(machine, Tracking(simulated), seed=0, simulator=quickest(machine))
     if not moves(log, axis):
         raise CannotRun(
             f"axis {axis}: its controller does not move it in a simulation of the model; check its "

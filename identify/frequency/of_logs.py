@@ -22,9 +22,6 @@ from twin.model.units import AxisUnits
 from twin.progress import Progress, silent
 from twin.simulator import quickest
 
-NEAR = 0.1  # of a mass, to which a response of little friction tells it
-MUCH = 0.5  # of the force, RMS, from which dry friction is much
-
 
 @dataclass(frozen=True, eq=False)
 class Shown:
@@ -95,7 +92,8 @@ def _less(shown: Shown, bias: Bias | None) -> Shown:
 def _bias(own: float | None, plant: Plant | None) -> Bias | None:
     """Of a mass, kg, that is known; None where it is not, or comes back."""
     back = None if plant is None else plant.mass
-    if own is None or (back and abs(back.value - own) < NEAR * own):
+    near = 0.1  # of a mass, to which a response of little friction tells it
+    if own is None or (back and abs(back.value - own) < near * own):
         return None
     return Bias(own, back)
 
@@ -112,7 +110,8 @@ def _with_friction(logs: Mapping[str, Log], name: str) -> float | None:
         return None
     dry = axis.friction.values.get("Fc", 0.0) if axis.friction else 0.0
     force = np.concatenate([log.axes[name].force for log in logs.values()])
-    return axis.mass if dry > MUCH * float(np.std(force)) else None
+    much = 0.5  # of the force, RMS, from which dry friction is much
+    return axis.mass if dry > much * float(np.std(force)) else None
 
 
 def _moves(log: Log, name: str) -> bool:

@@ -25,7 +25,6 @@ from twin.signals import Array
 
 SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
 DAMPING = (1e-4, 0.005, 0.05, 0.3)  # of a mode: least, two at which it is sought, and most
-NEAREST = 0.01  # of a response: the error that a polynomial over a resonance may have of its own
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,9 @@ def plant_of(found: Response, most: int = 4) -> Plant:
             f"the response is told at {len(told.frequency)} of {len(found.frequency)} frequencies, "
             "too few for a mass; excite the axis more: `twin simulate multisine`"
         )
-    told = replace(told, spread=np.hypot(told.spread, NEAREST * np.abs(told.plant)))
+    # of a response: the error that a polynomial over a resonance may have of its own
+    nearest = 0.01
+    told = replace(told, spread=np.hypot(told.spread, nearest * np.abs(told.plant)))
     best = _best_from(told, _without_modes(told))
     for _ in range(most):
         better = _best_from(told, _with_mode(told, best))

@@ -28,8 +28,6 @@ Complex = NDArray[np.complex128]
 
 POWERS = np.arange(3)  # of the polynomials, for the response and for the transient
 UNKNOWNS = 2 * len(POWERS)
-LOUDEST = 10.0  # times its surroundings, above which a line, of a slow motion, is left out: what
-# friction makes of it would decide there
 WEAK = 10.0  # F of the force that the instrument makes, below which the ratio of two responses is
 # biased towards that of the noise, which feedback makes (D. Staiger, J. H. Stock, Instrumental
 # Variables Regression with Weak Instruments, Econometrica 65, 1997)
@@ -172,7 +170,10 @@ class _Spectra:
         first = max(min(round(centre) - half, len(self.instrument) - 1 - 2 * half), 1)
         at = np.arange(first, min(first + 2 * half + 1, len(self.instrument)))
         size = np.abs(self.instrument[at])
-        at = at[size <= LOUDEST * np.median(size)]
+        # times its surroundings, above which a line, of a slow motion, is left out: what friction
+        # makes of it would decide there
+        loudest = 10.0
+        at = at[size <= loudest * np.median(size)]
         powers = (((at - centre) / half)[:, None] ** POWERS).astype(complex)
         columns = np.hstack([self.instrument[at, None] * powers, powers])
         size = np.linalg.norm(columns, axis=0)

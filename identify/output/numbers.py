@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 PREFIXED = frozenset({"m", "m/s", "m/s^2", "N", "N m", "s", "A", "rad", "rad/s", "rad/s^2", "N/s"})
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-LEAST = 0.5  # in its unit, of the largest value printed in it
 SHORTEST = 1e-3  # printed without a power of ten
 DIGITS = 3  # significant digits of a printed number
 NOTHING = "–"  # printed where there is no value
@@ -38,7 +37,8 @@ class Scale:
         """The unit in which the largest of these SI values is 0.5 or more, e.g. mN for 0.02 N."""
         finite = np.abs(np.asarray(values, dtype=float))
         largest = np.max(finite[np.isfinite(finite)], initial=0.0)
-        fitting = (p for p in PREFIXES if unit in PREFIXED and largest >= LEAST * p[0])
+        least = 0.5  # in its unit, of the largest value printed in it
+        fitting = (p for p in PREFIXES if unit in PREFIXED and largest >= least * p[0])
         size, prefix = next(fitting, (1.0, ""))
         return cls(size, prefix + pretty(unit))
 

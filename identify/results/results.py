@@ -54,9 +54,6 @@ class FitResult(Printed):
         return tuple(axis for axis in self.model.axes if axis not in self.fits)
 
 
-DISAGREE = 2.0  # times, by which the values of two objectives differ where one of them is wrong
-
-
 def refitted(fit: MotionFit) -> Iterator[tuple[ParameterReference, float, float]]:
     """Each parameter with its value by the fit of the force, and by this one."""
     where = free_parameters(fit.axis)
@@ -83,11 +80,13 @@ class SimulationFit(Printed):
 
         Of parameters that cannot be negative: of others, such as a phase, a ratio says nothing.
         """
+        # times, by which the values of two objectives differ where one of them is wrong
+        disagree = 2.0
         return tuple(
             (axis, c.label, before, after)
             for axis, fit in self.axes.items()
             for c, before, after in refitted(fit)
-            if c.parameter.lower >= 0.0 and not before <= DISAGREE * after <= DISAGREE**2 * before
+            if c.parameter.lower >= 0.0 and not before <= disagree * after <= disagree**2 * before
         )
 
 

@@ -16,9 +16,6 @@ from twin.errors import InputError
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
-BINS = 80  # of a curve of means
-FEW = 4  # values, of which a mean is drawn
-
 
 @dataclass(frozen=True, eq=False)
 class Signals:
@@ -82,8 +79,10 @@ def _left(axis: AxisModel, logs: tuple[PreparedLog, ...]) -> Array:
 
 def means(x: Array, y: Array) -> tuple[Array, Array]:
     """Middles of bins of x and the means of y in them, those that are known by a few values."""
+    bins = 80  # of a curve of means
     known = np.isfinite(x) & np.isfinite(y)
-    count, edges = np.histogram(x[known], BINS)
-    sums, _ = np.histogram(x[known], BINS, weights=y[known])
+    count, edges = np.histogram(x[known], bins)
+    sums, _ = np.histogram(x[known], bins, weights=y[known])
     middles = (edges[:-1] + edges[1:]) / 2.0
-    return middles, np.where(count >= FEW, sums / np.maximum(count, 1), np.nan)
+    few = 4  # values, of which a mean is drawn
+    return middles, np.where(count >= few, sums / np.maximum(count, 1), np.nan)

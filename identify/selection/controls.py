@@ -31,8 +31,6 @@ Array = NDArray[np.float64]
 Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 Falsify = Callable[[Array, np.random.Generator], Array]
 
-STRETCHES = 8  # of a log, each with a sign of its own
-SAME = 0.5  # of the square of shifted columns, from which they are in the span of the true ones
 TINY = np.finfo(float).tiny  # of what is nothing, as a column where the motion excites none
 
 
@@ -163,8 +161,9 @@ def _shifted(column: Array, rng: np.random.Generator) -> Array:
 
 
 def _signed(column: Array, rng: np.random.Generator) -> Array:
-    signs = rng.choice([-1.0, 1.0], STRETCHES)
-    return column * np.repeat(signs, -(-len(column) // STRETCHES))[: len(column), None]
+    stretches = 8  # of a log, each with a sign of its own
+    signs = rng.choice([-1.0, 1.0], stretches)
+    return column * np.repeat(signs, -(-len(column) // stretches))[: len(column), None]
 
 
 def _survives_shifts(columns: Sequence[Array]) -> bool:
@@ -174,7 +173,8 @@ def _survives_shifts(columns: Sequence[Array]) -> bool:
     for _ in range(4):  # shifts by which that is told
         moved = np.concatenate([_shifted(c, rng) for c in columns])
         inside.append(float(np.sum((own.T @ moved) ** 2) / max(np.sum(moved**2), TINY)))
-    return float(np.mean(inside)) > SAME
+    same = 0.5  # of the square of shifted columns, from which they are in the span of the true ones
+    return float(np.mean(inside)) > same
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,6 @@ from twin.effects import Catalogue
 from twin.model.machine import Fitted
 from twin.progress import Progress, silent
 
-SEEN = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
-
 
 class Verdict(Enum):
     """The answer of a diagnosis."""
@@ -233,4 +231,5 @@ def _small(found: Found) -> tuple[str, ...]:
     if found.final.at_floor:
         return ()
     scored = [(t, s) for t in found.last if (s := t.candidate.score) and not t.candidate.doubt]
-    return tuple(t.change.name for t, s in scored if s.t > SEEN[0] and s.part > SEEN[1])
+    seen = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
+    return tuple(t.change.name for t, s in scored if s.t > seen[0] and s.part > seen[1])

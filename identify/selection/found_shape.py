@@ -24,7 +24,6 @@ from twin.signals import Array
 BAND = NormalDist().inv_cdf(1.0 - RULE.chance)  # standard deviations, to each side
 UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
-WEAK = 1e-6  # of the data's weight: smoothing under which a law's own force is read off
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,8 @@ def _directions(shape: Shape, index: list[int], names: Sequence[str]) -> dict[st
 
 def _read_off(gram: Array, met: Array) -> Array:
     """Strengths (k,) whose columns come nearest to a force; products (k, k), with it (k,)."""
-    weak = WEAK * np.trace(gram) / len(gram) * np.eye(len(gram))
+    # of the data's weight: smoothing under which a law's own force is read off
+    weak = 1e-6 * np.trace(gram) / len(gram) * np.eye(len(gram))
     return np.asarray(solve(gram + weak, met[:, None])[:, 0])
 
 

@@ -20,8 +20,6 @@ from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted
 from twin.signals import Array
 
-SAME = 0.1  # relative distance from its value by design at which a law is still itself
-
 
 @dataclass(frozen=True)
 class FreeExponent:
@@ -38,7 +36,8 @@ class FreeExponent:
     @property
     def differs(self) -> bool:
         """Whether the law found is another than the one that is held."""
-        return abs(self.found - self.held) > SAME * abs(self.held)
+        same = 0.1  # relative distance from its value by design at which a law is still itself
+        return abs(self.found - self.held) > same * abs(self.held)
 
 
 def held_exponents(law: Fitted) -> tuple[str, ...]:

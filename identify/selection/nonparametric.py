@@ -30,8 +30,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 Array = NDArray[np.float64]
 
-ROUNDS = 3  # of choosing the smoothing again, at most
-
 
 def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     """Fit a nonparametric effect beside the physics of a base, and judge it on the selection logs.
@@ -42,7 +40,7 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     covered = effect.starts(excitation([log.motion for log in dataset.fit], None))
     empty = Fitted.at_start(effect, covered)
     best = _attempt(base, dataset, empty)
-    for _ in range(ROUNDS):
+    for _ in range(3):  # of choosing the smoothing again, at most
         # The missing force had distorted the physics of the base, so choose again beside the refit.
         again = _attempt(fit_without(best.fit, dataset, effect.name), dataset, empty)
         if not again.fit.error < RULE.fallen * best.fit.error:

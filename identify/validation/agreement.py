@@ -30,11 +30,6 @@ from twin.model.parameters import ParameterReference, all_parameters, free_param
 from twin.signals import Array
 from twin.simulator import ReducedSimulator
 
-FALSE_ALARM = 0.01  # chance that two fits of one machine are said to differ
-LEAST_SHARE = 0.05  # of the squared force of the difference, for an effect to be a cause of it
-ALIKE = 0.01  # of that squared force, by which effects that explain equally much may differ
-TRIED = 10.0  # s of simulated motion along which forces are compared
-
 
 @dataclass(frozen=True)
 class Difference:
@@ -201,7 +196,8 @@ def _limit(count: int) -> float:
     """Quantile of t that none of so many comparisons exceeds, but for FALSE_ALARM."""
     from scipy.special import stdtrit  # no fit needs it
 
-    each = 1.0 - (1.0 - FALSE_ALARM) ** (1.0 / max(count, 1))
+    false_alarm = 0.01  # chance that two fits of one machine are said to differ
+    each = 1.0 - (1.0 - false_alarm) ** (1.0 / max(count, 1))
     return float(stdtrit(2 * (BLOCKS - 1), 1.0 - each / 2.0))
 
 
@@ -235,10 +231,11 @@ def _causes(force: Array, bases: Mapping[str, Array]) -> tuple[Cause, ...]:
         joined = {n: orthonormal(np.hstack([taken, basis])) for n, basis in bases.items()}
         shares = {n: left - (rms(unabsorbed(force, q)) / whole) ** 2 for n, q in joined.items()}
         most = max(shares.values())
-        if most < LEAST_SHARE:
+        if most < 0.05:  # of the squared force of the difference, for an effect to be a cause of it
             break
         # Of effects that explain equally much the one with the fewest parameters comes first.
-        equal = [n for n, share in shares.items() if share > most - ALIKE]
+        alike = 0.01  # of that squared force, by which effects that explain equally much may differ
+        equal = [n for n, share in shares.items() if share > most - alike]
         best = min(equal, key=lambda n: bases[n].shape[1])
         causes.append(Cause(best, shares[best], tuple(n for n in equal if n != best)))
         taken, left = joined[best], left - shares[best]
@@ -248,7 +245,8 @@ def _causes(force: Array, bases: Mapping[str, Array]) -> tuple[Cause, ...]:
 def _along_a_motion(model: MachineModel, axis: str) -> Fit | None:
     """The model on a simulated motion of its own; None where the machine can make none."""
     try:
-        log = simulate(model, "tracking", duration=TRIED, simulator=ReducedSimulator)
+        tried = 10.0  # s of simulated motion along which forces are compared
+        log = simulate(model, "tracking", duration=tried, simulator=ReducedSimulator)
     except CannotRun:
         return None
     stage = model.axes[axis]

@@ -26,7 +26,6 @@ from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
 
 LOGGER = logging.getLogger("identify")
 HORIZON = 0.5  # s between restarts
-SEED = 0  # of the added noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +88,7 @@ def free_run(
 
 def drift_of_noise(model: MachineModel, logs: Mapping[str, PreparedLog], run: FreeRun) -> FreeRun:
     """The drift that noise of readings and command alone causes: the exact model has it as well."""
-    noisy = free_run(model, logs, noise=np.random.default_rng(SEED))
+    noisy = free_run(model, logs, noise=np.random.default_rng(0))  # of the added noise
     for axis, error in run.error.items():
         noisy.error[axis] -= error
     return noisy

@@ -19,14 +19,8 @@ from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
 from twin.signals import Array
 
-REGIONS = 24  # bins along a coordinate
 ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
-CHANCE = 0.01  # probability that noise alone makes any region of all maps count as bad
 LEAST_SHARE = 0.02  # least excess of a region's share of squared error over its share of time
-SHORTEST = 8  # blocks of the test functions of the spectrum, the fewest allowed
-SEGMENT = 4.0  # s of each part of a log that is transformed
-LEAST_PASSED = 0.2  # of the force's power that the test functions must pass
-OCTAVE_PARTS = 2  # bands an octave
 TINY = np.finfo(float).tiny
 KNOWN_UNITS = {**UNITS, "command": LINEAR.force, "standstill": "1"}  # of a linear axis
 # Coordinates with two values only: their edges.
@@ -120,7 +114,8 @@ def misfit_map(
     if name in TWO_SIDED:
         edges = TWO_SIDED[name]
     else:
-        edges = np.linspace(coordinate.min(), coordinate.max() + 1e-15, REGIONS + 1)
+        regions = 24  # bins along a coordinate
+        edges = np.linspace(coordinate.min(), coordinate.max() + 1e-15, regions + 1)
     index = np.clip(np.searchsorted(edges, coordinate, side="right") - 1, 0, len(edges) - 2)
     bins = len(edges) - 1
     count = np.maximum(np.bincount(index, minlength=bins), 1)
@@ -179,27 +174,30 @@ def misfit_by_frequency(axis: AxisModel, logs: Sequence[PreparedLog]) -> MisfitM
 def _spectrum(axis: AxisModel, log: PreparedLog, noise: Noise) -> tuple[Array, Array, Array, Array]:
     """Of one log: frequencies Hz, power N^2/Hz of error, noise and what is to be explained."""
     motion = log.motion
-    short = PreparedLog.of(motion, SHORTEST * motion.period)
+    shortest = 8  # blocks of the test functions of the spectrum, the fewest allowed
+    short = PreparedLog.of(motion, shortest * motion.period)
     force = np.where(moving([short], sticks(axis)), residual(axis, [short]), 0.0)
     period = short.test_function.stride * motion.period
-    segment = min(round(SEGMENT / period), len(force))
+    segment = min(round(4.0 / period), len(force))  # s of each part of a log that is transformed
     both = np.stack([force, short.command - axis.mass * short.acceleration])
     pieces = pieces_of(both, segment)
     power = densities(pieces - pieces.mean(axis=-1, keepdims=True), period).mean(axis=1)
     frequency = np.asarray(np.fft.rfftfreq(segment, period), dtype=float)
     ratio = round(period / motion.sample_period)
     passed = short.test_function.response(motion.sample_period, segment * ratio)[: len(frequency)]
-    kept = (passed > LEAST_PASSED) & (frequency > 0.0)
+    least_passed = 0.2  # of the force's power that the test functions must pass
+    kept = (passed > least_passed) & (frequency > 0.0)
     frequency, (error, explain) = frequency[kept], power[:, kept] / passed[kept]
     return frequency, error, np.interp(frequency, noise.frequency, noise.power), explain
 
 
 def _edges(frequency: Array) -> Array:
     """Edges (k + 1,) Hz of bands of part octaves, each with a frequency at least."""
-    count = int(OCTAVE_PARTS * np.log2(frequency[-1] / frequency[0])) + 1
+    octave_parts = 2  # bands an octave
+    count = int(octave_parts * np.log2(frequency[-1] / frequency[0])) + 1
     top = frequency[-1] + 0.5 * (frequency[1] - frequency[0])
     kept = [0.5 * frequency[0]]
-    for edge in (top * 2.0 ** (-k / OCTAVE_PARTS) for k in range(count, -1, -1)):
+    for edge in (top * 2.0 ** (-k / octave_parts) for k in range(count, -1, -1)):
         if ((frequency >= kept[-1]) & (frequency < edge)).any():
             kept.append(edge)
     return np.array(kept)
@@ -220,7 +218,8 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
         from scipy.special import chdtri  # where no region stands out, as in a fit, nothing asks
 
         values = np.maximum(samples * m.visited, 1.0)
-        chance = np.sqrt(chdtri(values, CHANCE / max(tried, 1)) / values)
+        # probability that noise alone makes any region of all maps count as bad
+        chance = np.sqrt(chdtri(values, 0.01 / max(tried, 1)) / values)
         excess[~(m.rms > chance * m.floor)] = 0.0
         i = int(np.argmax(excess))
         low, high, error, floor, share, visited = (

@@ -25,11 +25,6 @@ from twin.progress import Progress, silent
 from twin.signals import Array, between, moving_mean, rate
 from twin.simulator import ReducedSimulator, run
 
-SMOOTHED = 5e-3  # s, over which a motion is averaged thrice: of a reading nothing else is left
-BEGUN = 0.2  # s, within which a motion that the log begins amidst is begun from rest
-FORGOTTEN = 1e-9  # what is left of a value in the speed filter when it is left out
-SEED = 0  # of the encoders' noise, the same in every run
-
 
 @dataclass(frozen=True)
 class TrackingError:
@@ -121,8 +116,10 @@ def _less(axis: AxisModel, effect: str, before: AxisModel | None) -> AxisModel:
 
 def _motion(model: MachineModel, log: Log) -> Setpoint:
     """The motion of a log, of its setpoint where it has one, smooth enough to be followed."""
-    width = 2 * round(0.5 * SMOOTHED * log.sample_rate) + 1
-    columns, done = [], np.clip(np.arange(len(log)) * log.period / BEGUN, 0.0, 1.0)
+    smoothed = 5e-3  # s, over which a motion is averaged thrice: of a reading nothing else is left
+    width = 2 * round(0.5 * smoothed * log.sample_rate) + 1
+    # s, within which a motion that the log begins amidst is begun from rest
+    columns, done = [], np.clip(np.arange(len(log)) * log.period / 0.2, 0.0, 1.0)
     begun = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
     for name in model.axes:
         own = log.axes[name].columns if name in log.axes else {"position": np.zeros(len(log))}
@@ -147,10 +144,11 @@ def _errors(
             for i, a in enumerate(machine.axes)
         ]
         force = motion.force if model is None else _force(model, motion)
+        seed = 0  # of the encoders' noise, the same in every run
         done = run(
             replace(machine, sample_rate=motion.sample_rate),
             replace(motion, velocity=np.stack(speeds, axis=1), force=force),
-            np.random.default_rng(SEED), simulator=ReducedSimulator, controllers=feedback,
+            np.random.default_rng(seed), simulator=ReducedSimulator, controllers=feedback,
         )  # fmt: skip
         for name in names:
             i = _at(machine, name)
@@ -165,7 +163,8 @@ def _as_read(position: Array, bandwidth: float, sample_rate: float) -> Array:
     With that as its setpoint a controller does not act against a motion that is as it should be.
     """
     kept = float(np.exp(-2.0 * np.pi * bandwidth / sample_rate))
-    taps = 1 + int(np.ceil(np.log(FORGOTTEN) / np.log(kept))) if kept > FORGOTTEN else 1
+    forgotten = 1e-9  # what is left of a value in the speed filter when it is left out
+    taps = 1 + int(np.ceil(np.log(forgotten) / np.log(kept))) if kept > forgotten else 1
     speed = np.concatenate([np.zeros(taps), between(position, 1.0 / sample_rate)])
     return np.convolve(speed, (1.0 - kept) * kept ** np.arange(taps), "valid")
 

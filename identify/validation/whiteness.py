@@ -22,10 +22,6 @@ from twin.signals import Array
 NORMAL = NormalDist()
 
 WITHIN = 0.90  # part of a white residual's correlations within the bounds
-SURE = 0.99  # part of white residuals whose every correlation is within the wider limit
-MOST_LAGS = 40  # that are tested and drawn; what is slower is seen at these, too
-BINS = 41  # of the histogram; odd, so that one is at zero
-REACH = 5.0  # noise floors that the histogram spans at least
 
 
 class Loop(Enum):
@@ -113,8 +109,9 @@ def residual_tests(
     left = np.concatenate(series["residual"])
     left = left[np.isfinite(left)]
     spacing = logs[0].test_function.stride * apart[0] * logs[0].motion.period
-    reach = max(REACH * floor, float(np.quantile(np.abs(left), 0.995)))
-    edges = np.linspace(-reach, reach, BINS + 1)
+    # noise floors that the histogram spans at least
+    reach = max(5.0 * floor, float(np.quantile(np.abs(left), 0.995)))
+    edges = np.linspace(-reach, reach, 41 + 1)  # of the histogram; odd, so that one is at zero
     count, _ = np.histogram(left, edges)
     return ResidualTests(
         loop=loop,
@@ -137,7 +134,8 @@ def correlation(
 
     spacing: s, from one value to the next.
     """
-    most = max(min(MOST_LAGS, min(map(len, residual)) // 4), 1)
+    most_lags = 40  # that are tested and drawn; what is slower is seen at these, too
+    most = max(min(most_lags, min(map(len, residual)) // 4), 1)
     own = signal == "residual"
     lags = np.arange(1 if own else -most, most + 1)
     a, b = (_centred(rows) for rows in (residual, other))
@@ -149,13 +147,14 @@ def correlation(
         tested = lags > 0  # under feedback the command of the same instant depends on the noise
     count = int(tested.sum())
     root = np.sqrt(max(n, 1))
+    sure = 0.99  # part of white residuals whose every correlation is within the wider limit
     return Correlation(
         signal=signal,
         lag=np.asarray(spacing * lags),
         value=products / max(power, 1e-300),
         tested=tested,
         bound=float(NORMAL.inv_cdf(0.5 + WITHIN / 2.0) / root),
-        limit=float(NORMAL.inv_cdf(1.0 - (1.0 - SURE) / 2.0 / count) / root),
+        limit=float(NORMAL.inv_cdf(1.0 - (1.0 - sure) / 2.0 / count) / root),
     )
 
 

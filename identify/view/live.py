@@ -17,8 +17,6 @@ SPACE, RIGHT, LEFT, DOWN, UP, HOME = 32, 262, 263, 264, 265, 268  # keys, as the
 LEAP = 0.5  # s, of the arrow keys
 KEYS = "space\nleft, right\nup, down\nhome\nG"
 DO = "pause\n0.5 s back, on\nspeed {speed:g} x\nbeginning\nmodel"
-STRIPS = 0.3  # of the window's height
-LOWER = 0.15  # of the machine
 
 
 @dataclass
@@ -73,7 +71,8 @@ def show(replay: Replay, gain: float, speed: float) -> None:
             wide, tall = window.viewport.width, window.viewport.height
             if (wide, tall) != size:
                 size = wide, tall
-                below = strips(replay, max(wide, 100), max(int(STRIPS * tall), 100))
+                # of the window's height
+                below = strips(replay, max(wide, 100), max(int(0.3 * tall), 100))
             beside, marked = panel(replay, frame, gain), at_time(below, frame / len(replay))
             window.set_images([
                 (mujoco.MjrRect(0, bottom, picture.shape[1], len(picture)), picture)
@@ -88,7 +87,8 @@ def show(replay: Replay, gain: float, speed: float) -> None:
 def _look(stage: Stage, camera: mujoco.MjvCamera) -> None:
     """Look from where the first camera of the model stands, free to go around."""
     mujoco.mjv_defaultFreeCamera(stage.model, camera)
-    camera.lookat[2] -= LOWER * stage.model.stat.extent  # the strips hide what is below
+    lower = 0.15  # of the machine
+    camera.lookat[2] -= lower * stage.model.stat.extent  # the strips hide what is below
     if stage.model.ncam:
         mujoco.mj_camlight(stage.model, stage.data)
         away = stage.data.cam_xpos[0] - camera.lookat

@@ -13,7 +13,6 @@ from twin.mujoco.mechanism import read_bodies
 from twin.mujoco.mjcf import read_spec
 
 GREY, DARK, BLUE = (0.70, 0.72, 0.75, 1), (0.25, 0.27, 0.30, 1), (0.25, 0.42, 0.60, 1)
-THICK = 0.09  # of the mean length of links, that of a link
 
 
 def joints_spec(machine: MachineModel) -> mujoco.MjSpec:
@@ -43,7 +42,7 @@ def _rods(spec: mujoco.MjSpec) -> None:
     ]
     links = [end for body, ends in bodies if body.joints or not body.bodies for end in ends]
     lengths = [float(np.linalg.norm(end)) for end in links if end.any()]
-    thick = THICK * float(np.mean(lengths or [1.0]))
+    thick = 0.09 * float(np.mean(lengths or [1.0]))  # of the mean length of links, that of a link
     capsule, cylinder = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
     for body, ends in bodies:
         for end in ends:

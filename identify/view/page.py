@@ -18,9 +18,7 @@ from identify.view.stage import Stage, camera, shapes
 from twin.files import write_atomically
 from twin.signals import Array
 
-OF_MESHES = 900_000  # bytes, so that the page has 3 MB at most: see identify.view.replay
 STEPS = 32_767  # of a signal on either side of its middle; -32768 stands for none
-CELLS = (65_535, 512, 256, 128, 64, 32, 16, 8)  # of a mesh along its longest side, until it fits
 
 
 def write_page(path: Path, replay: Replay, gain: float, speed: float) -> None:
@@ -97,7 +95,8 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
         if np.isfinite(replay.axes[axis].setpoint).any()
     ]  # fmt: skip
     eye, fovy = camera(model, data)
-    share = OF_MESHES // max(len(meshes), 1)
+    of_meshes = 900_000  # bytes, so that the page has 3 MB at most: see identify.view.replay
+    share = of_meshes // max(len(meshes), 1)
     return {
         "links": links, "geoms": geoms, "marks": marks,
         "meshes": [_mesh(model, m, share) for m in meshes],
@@ -143,7 +142,8 @@ def _mesh(model: mujoco.MjModel, mesh: int, most: int) -> dict[str, Any]:
 def _coarser(places: Array, corners: Any) -> Iterator[tuple[int, Any, Any]]:
     """Cells, vertices as cells of a grid and faces, ever fewer, none without an area."""
     longest = float(np.ptp(places, axis=0).max()) or 1.0
-    for cells in CELLS:
+    # of a mesh along its longest side, until it fits
+    for cells in (65_535, 512, 256, 128, 64, 32, 16, 8):
         near = np.rint(places * (cells / longest)).astype(np.int64)
         grid, index = np.unique(near, axis=0, return_inverse=True)
         faces = index.reshape(-1)[corners]

@@ -17,11 +17,11 @@ Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 
 INK, SOFT, BAR, PAPER = (27, 42, 56), (91, 104, 117), (47, 109, 179), (255, 255, 255)
 WIDE, LINE = 330, 19  # pixels: of the panel, of a line in it
-ZERO, REACH = 195, 45  # pixels: where the bars begin, and how far they go
 
 
 def panel(replay: Replay, frame: int, gain: float) -> Pixels:
     """Time, and of each axis the differences to what was measured and the force of each effect."""
+    zero, reach = 195, 45  # pixels: where the bars begin, and how far they go
     font = ImageFont.truetype(findfont("DejaVu Sans"), 13)  # it has µ and comes with matplotlib
     lines = sum(4 + len(axis.forces) for axis in replay.axes.values())
     image = Image.new("RGB", (WIDE, LINE * (lines + 2) + 12), PAPER)
@@ -46,8 +46,8 @@ def panel(replay: Replay, frame: int, gain: float) -> Pixels:
         largest = max((np.abs(f).max() for f in axis.forces.values()), default=0.0) or 1.0
         for effect, force in axis.forces.items():
             top = line(effect, quantity(force[frame], axis.units.force))
-            end = ZERO + REACH * force[frame] / largest
-            draw.rectangle((min(ZERO, end), top + 3, max(ZERO, end), top + 13), BAR)
+            end = zero + reach * force[frame] / largest
+            draw.rectangle((min(zero, end), top + 3, max(zero, end), top + 13), BAR)
     return np.asarray(image)
 
 

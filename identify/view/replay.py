@@ -20,11 +20,6 @@ from twin.model.units import AxisUnits
 from twin.parallel import parallel
 from twin.signals import Array
 
-FRAMES = 60.0  # 1/s, what a screen shows
-MOST_VALUES = 700_000  # of all signals together: 1.9 MB of a page, which has 3 MB at most
-OF_AXIS = 8  # signals beside the forces, that which was measured twice as exact
-SEEN = 0.1  # of the motion: as far as a difference is drawn, 19 times of 20
-
 
 @dataclass(frozen=True, eq=False)
 class Strip:
@@ -87,7 +82,8 @@ class Replay:
                 for axis in self.axes.values()
                 if (usual := _usual(getattr(axis, other) - axis.measured)) > 0.0
             ]
-            if wanted := SEEN * min(filter(None, ratios), default=0.0):
+            seen = 0.1  # of the motion: as far as a difference is drawn, 19 times of 20
+            if wanted := seen * min(filter(None, ratios), default=0.0):
                 power = 10.0 ** np.floor(np.log10(wanted))
                 return max(float(power * max(n for n in (1, 2, 5) if n * power <= wanted)), 1.0)
         return 1.0
@@ -177,8 +173,11 @@ class _Cut:
 
     @classmethod
     def of(cls, machine: MachineModel, log: Log, begun: int, end: int) -> _Cut:
-        signals = sum(OF_AXIS + len(axis.effects) for axis in machine.axes.values())
-        step = max(log.sample_rate / FRAMES, 1.0, (end - begun) * signals / MOST_VALUES)
+        of_axis = 8  # signals beside the forces, that which was measured twice as exact
+        signals = sum(of_axis + len(axis.effects) for axis in machine.axes.values())
+        frames = 60.0  # 1/s, what a screen shows
+        most_values = 700_000  # of all signals together: 1.9 MB of a page, which has 3 MB at most
+        step = max(log.sample_rate / frames, 1.0, (end - begun) * signals / most_values)
         first = np.arange(int(np.ceil((end - begun) / step))) * step
         return cls(begun, end - begun, log.period, log.sample_rate / step, first.astype(np.int64))
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from identify.view.replay import AxisReplay, Replay
-from identify.view.stage import BALL, BEHIND, GHOST, MARK, PLANE, Stage, camera, shapes
+from identify.view.stage import BALL, BEHIND, GHOST, MARK, Stage, camera, shapes
 from twin.errors import InputError
 from twin.files import write_atomically
 from twin.signals import Array
@@ -30,9 +30,6 @@ TIME = "time"  # s, of the log
 MACHINE, CURVES = "machine", "signals"  # first parts of the names of what is recorded
 MEASURED, MODELLED, SETPOINT = "measured", "modelled", "setpoint"
 COLOURS = {MODELLED: GHOST[:3], SETPOINT: MARK[:3]}  # of curves, as of what moves
-SHARES = (3, 2)  # of the height: of the machine, of its signals
-FOVY = 55.0  # degrees that Rerun shows from top to bottom
-SKY = (205, 212, 219)  # behind the machine
 XYZW = [1, 2, 3, 0]  # a quaternion of Rerun, in one of MuJoCo
 
 
@@ -74,15 +71,18 @@ def _layout(stage: Stage, replay: Replay, drawn: str, speed: float) -> Any:
         for axis, own in replay.axes.items()
     ]  # fmt: skip
     centre, (seen_from, fovy) = stage.model.stat.center, camera(stage.model, stage.data)
-    nearer = np.tan(np.radians(0.5 * fovy)) / np.tan(np.radians(0.5 * FOVY))
+    # degrees that Rerun shows from top to bottom
+    nearer = np.tan(np.radians(0.5 * fovy)) / np.tan(np.radians(0.5 * 55.0))
     look = rrb.EyeControls3D(
         position=centre + nearer * (seen_from - centre), look_target=centre, eye_up=(0.0, 0.0, 1.0)
     )
+    sky = (205, 212, 219)  # behind the machine
     machine = rrb.Spatial3DView(
-        origin=MACHINE, name=drawn, background=SKY, line_grid=False, eye_controls=look
+        origin=MACHINE, name=drawn, background=sky, line_grid=False, eye_controls=look
     )
+    shares = (3, 2)  # of the height: of the machine, of its signals
     return rrb.Blueprint(
-        rrb.Vertical(machine, rrb.Tabs(*tabs), row_shares=SHARES),
+        rrb.Vertical(machine, rrb.Tabs(*tabs), row_shares=shares),
         rrb.TimePanel(timeline=TIME, playback_speed=speed, play_state="paused", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -134,7 +134,8 @@ def _drawn(model: mujoco.MjModel, geom: int, shape: str, rgba: Any) -> Any:
     if shape == "ellipsoid":  # a sphere has one size
         return rr.Ellipsoids3D(half_sizes=[np.where(size, size, size[0])], **solid)
     if shape == "plane":  # without end where it has no size
-        size = np.array([*np.where(size[:2], size[:2], PLANE * model.stat.extent), 0.0])
+        plane = 4.0  # of the machine: half the size of a plane without end
+        size = np.array([*np.where(size[:2], size[:2], plane * model.stat.extent), 0.0])
     return rr.Boxes3D(half_sizes=[size], **solid)
 
 

@@ -13,17 +13,10 @@ from identify.view.replay import Replay
 from twin.mujoco.mjcf import machine_spec
 from twin.signals import Array
 
-LARGEST = 1280  # pixels of a picture
 GHOST = (0.20, 0.55, 1.00, 0.40)  # of the modelled machine, red green blue alpha
 MARK = (1.00, 0.45, 0.05, 1.0)  # of the setpoint
 BEHIND = 0.998  # of its size, at which a ghost that is where the machine is lies hidden in it
-SHADOW = 1024  # pixels of its map: what a display without a graphics card draws in time
-ABOVE = 0.04  # of the machine, by which a mark stands above its axis
-END = 0.9  # of half the length of a shape: where its mark stands
 BALL = 0.012  # of the machine: the radius of a mark
-PLANE = 4.0  # of the machine: half the size of a plane without end
-VISIBLE = 3  # groups of geoms that MuJoCo shows by default
-CLEAR = 0.05  # alpha below which a shape is not drawn
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_PLANE: "plane",
     mujoco.mjtGeom.mjGEOM_SPHERE: "ellipsoid",
@@ -103,6 +96,7 @@ class Stage:
 
 def _spec(replay: Replay) -> mujoco.MjSpec:
     """The machine without what effects attach, which no log tells the motion of."""
+    largest = 1280  # pixels of a picture
     machine = replay.machine
     if machine.joints:
         spec = joints_spec(machine)
@@ -114,9 +108,10 @@ def _spec(replay: Replay) -> mujoco.MjSpec:
         if not machine.mjcf:
             dress(spec, replay)
     looks = spec.visual
-    looks.global_.offwidth = max(looks.global_.offwidth, LARGEST)
-    looks.global_.offheight = max(looks.global_.offheight, LARGEST)
-    looks.quality.shadowsize = min(looks.quality.shadowsize, SHADOW)
+    looks.global_.offwidth = max(looks.global_.offwidth, largest)
+    looks.global_.offheight = max(looks.global_.offheight, largest)
+    shadow = 1024  # pixels of its map: what a display without a graphics card draws in time
+    looks.quality.shadowsize = min(looks.quality.shadowsize, shadow)
     return spec
 
 
@@ -131,8 +126,9 @@ def _mark(model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> tuple[int, 
         place, reach = data.geom_xpos[i] + turned @ centre, np.abs(turned) @ half
         top = max(top, place[2] + reach[2])
         along = int(np.argmax(reach[:2]))
-        place[along] -= END * reach[along]
-    place[2] = max(top, place[2]) + ABOVE * model.stat.extent
+        place[along] -= 0.9 * reach[along]  # of half the length of a shape: where its mark stands
+    above = 0.04  # of the machine, by which a mark stands above its axis
+    place[2] = max(top, place[2]) + above * model.stat.extent
     return body, data.xmat[body].reshape(3, 3).T @ (place - data.xpos[body])
 
 
@@ -140,7 +136,9 @@ def shapes(model: mujoco.MjModel) -> Iterator[tuple[int, str, Array]]:
     """The geoms that are seen: number, shape, and red, green, blue, alpha."""
     for i in range(model.ngeom):
         shape, rgba = SHAPES.get(mujoco.mjtGeom(model.geom_type[i])), _colour(model, i)
-        if shape and rgba[3] >= CLEAR and model.geom_group[i] < VISIBLE:
+        visible = 3  # groups of geoms that MuJoCo shows by default
+        clear = 0.05  # alpha below which a shape is not drawn
+        if shape and rgba[3] >= clear and model.geom_group[i] < visible:
             yield i, shape, rgba
 
 

@@ -18,13 +18,13 @@ from twin.errors import InputError
 from twin.files import write_atomically
 from twin.progress import Progress
 
-RATE = 30.0  # frames a second of the video
 WIDTH, HEIGHT, BELOW = 1280, 720, 280  # pixels, even: of the machine, of the strips
 
 
 def write_video(path: Path, replay: Replay, gain: float, speed: float, progress: Progress) -> None:
     """Write the replay as MP4; speed: 1 is real time. Raises InputError."""
-    encoder, every = _encoder(), replay.rate * speed / RATE
+    rate = 30.0  # frames a second of the video
+    encoder, every = _encoder(), replay.rate * speed / rate
     count = max(int(len(replay) / every), 1)
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "made.mp4"
@@ -33,7 +33,7 @@ def write_video(path: Path, replay: Replay, gain: float, speed: float, progress:
             tall, wide, _ = next(drawn).shape  # the first is drawn twice
             command: list[str | Path] = [
                 encoder, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
-                f"{wide}x{tall}", "-r", f"{RATE:g}", "-i", "-", "-pix_fmt", "yuv420p", made,
+                f"{wide}x{tall}", "-r", f"{rate:g}", "-i", "-", "-pix_fmt", "yuv420p", made,
             ]  # fmt: skip
             with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as running:
                 assert running.stdin is not None

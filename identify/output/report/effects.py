@@ -131,8 +131,6 @@ def shape_charts(shape: FoundShape) -> list[Chart]:
 
 # --- candidates ------------------------------------------------------------------------------
 
-WITH_VALUES = 3  # candidates whose parameter values are printed
-
 
 def ranking(view: AxisView) -> list[Block]:
     """A table of all absent effects that were refitted, best first, and the others' names."""
@@ -153,6 +151,7 @@ def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     rows = []
     for rank, c in enumerate(refitted):
         tone, part = Tone.PLAIN if c.supported else Tone.MUTED, max(c.part, 0.0)
+        with_values = 3  # candidates whose parameter values are printed
         cells = (
             title_case(c.effect.name),
             number(c.delta_bic),
@@ -160,7 +159,7 @@ def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
             scale.text(c.gain.after),
             percent(part),
             spaced(why_not(found, c)),
-            values_of(c.effect, c.fit.axis) if rank < WITH_VALUES else "",
+            values_of(c.effect, c.fit.axis) if rank < with_values else "",
         )
         rows.append(Row(cells, Tone.STRONG if c is found.best else tone, min(part, 1.0)))
     titles = (

@@ -19,10 +19,6 @@ from twin.signals import Array
 
 Named = dict[str, tuple[str, Array, Scale]]
 
-MOST_VALUES = 950_000  # in a page, of 2 bytes, which are 2.7 characters: 2.5 of at most 3 MB
-LARGEST = 32767  # of 16 bits; the number below the least stands for no number
-NO_NUMBER = -32768
-SMALLEST = 1e-6  # of the largest deviation of a signal: the least that is still told from zero
 TO_EXPLAIN = "measured force minus mass × acceleration"
 OTHER = "other_axis_"
 UNSUITED = ("direction",)  # coordinates of two values, over which no curve can be drawn
@@ -33,7 +29,8 @@ def explored(subject: Subject) -> list[dict[str, Any]]:
     """The signals of all axes, the leading one first."""
     views = [view for view in subject.views if np.isfinite(view.signals.before).any()]
     named = [named_signals(view) for view in views]
-    most = MOST_VALUES // max(sum(map(len, named)), 1)
+    most_values = 950_000  # in a page, of 2 bytes, which are 2.7 characters: 2.5 of at most 3 MB
+    most = most_values // max(sum(map(len, named)), 1)
     return [_axis(view, own, most) for view, own in zip(views, named, strict=True)]
 
 
@@ -168,7 +165,9 @@ def _coded(values: Array) -> dict[str, Any]:
     middle = float(np.median(known))
     beside, sizes = np.where(finite, values - middle, 0.0), np.abs(known - middle)
     largest = float(sizes.max()) or 1.0
-    scale = max(float(np.median(sizes)), SMALLEST * largest)
-    step = float(np.arcsinh(largest / scale)) / LARGEST
-    coded = np.where(finite, np.rint(np.arcsinh(beside / scale) / step), NO_NUMBER)
+    smallest = 1e-6  # of the largest deviation of a signal: the least that is still told from zero
+    scale = max(float(np.median(sizes)), smallest * largest)
+    # of 16 bits; the number below the least stands for no number
+    step = float(np.arcsinh(largest / scale)) / 32767
+    coded = np.where(finite, np.rint(np.arcsinh(beside / scale) / step), -32768)
     return {"middle": middle, "scale": scale, "step": step, "data": packed(coded)}

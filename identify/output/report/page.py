@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from identify.output.report.subject import AxisView, Subject
 
 NUMBER = re.compile(rf"(-?([\d.]+(e[+-]\d+)?|∞)( \S+)?|{NOTHING})?")  # a cell, with its unit
-CHART_DIGITS = 5  # significant, of a number that is drawn
 
 TEMPLATES = Environment(
     loader=PackageLoader("identify.output.report", "."), autoescape=True,
@@ -109,7 +108,8 @@ class Chart(Block):
 
 def printed(values: Array) -> list[float | None]:
     """Numbers as short as a picture needs them; None for what is none."""
-    return [float(f"{v:.{CHART_DIGITS}g}") if np.isfinite(v) else None for v in values]
+    chart_digits = 5  # significant, of a number that is drawn
+    return [float(f"{v:.{chart_digits}g}") if np.isfinite(v) else None for v in values]
 
 
 @dataclass(frozen=True)

@@ -168,9 +168,6 @@ def nonparametric_in_words(fitted: Fitted) -> str:
 
 # --- what was done to the logs ----------------------------------------------------------------
 
-WORTH_SAYING = 0.05  # part of a log beyond the training logs that a reader should know of
-HALF = 0.15  # samples, within which a shift of half a sample is told as such
-
 
 def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
     """What was done to the logs before they were fitted, that a reader should know."""
@@ -190,7 +187,7 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
         f"{log}: {percent(part)} of this {'test' if log in tests else 'selection'} log is left "
         "out: it lies at positions where no training log has been"
         for log, part in dataset.beyond.items()
-        if part > WORTH_SAYING
+        if part > 0.05  # part of a log beyond the training logs that a reader should know of
     ]
     return tuple(said)
 
@@ -201,7 +198,7 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
         return None
     samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
     why = "no drive can do that, so check how force and position are sampled"
-    if abs(samples - 0.5) < HALF:
+    if abs(samples - 0.5) < 0.15:  # samples, within which a shift of half a sample is told as such
         why = "force and position seem to be read at the same instant"
     return (
         f"the force acts {1e6 * dataset.channel_delay:.0f} µs ({samples:.2f} samples) before its "
