@@ -23,7 +23,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
-from twin.export.c_source import CSource, c_source
+from twin.export.formats.c import CSource, c_source
 from twin.feedforward import feedforward
 from twin.laws.trials import companion, moderate
 from twin.model.file import load_model

@@ -12,7 +12,7 @@ from effect_runs import CATALOGUE
 from numpy.polynomial import Polynomial
 
 from twin.effect import Effect, Kind
-from twin.export.c_source import CSource, c_source
+from twin.export.formats.c import CSource, c_source
 from twin.feedforward import feedforward, followed
 from twin.laws.trials import Motion, companion, forces, moderate
 from twin.model.file import load_model, save_model

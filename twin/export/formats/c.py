@@ -1,11 +1,182 @@
-"""C99: one function for each axis that turns its setpoint into the force of the drive."""
+"""The feedforward of a machine as C99: a function for each axis, from the laws of its effects.
+
+What the C looks like is in ``templates``. ``twin.feedforward`` is the same in Python; the tests
+compare the two.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil
+from xml.sax.saxutils import quoteattr
 
-from twin.export import Exported, Exporter
-from twin.export.c_source import c_source
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from twin.core.native import LONGEST_STEP
+from twin.effect import IO_SIZE, Effect, Kind
+from twin.errors import InputError
+from twin.export import Exported, Exporter, Remark, axis_identifiers, identifier
+from twin.export.c_law import SLOTS, CannotTranslate, CLaws
+from twin.feedforward import followed
 from twin.logs import Log
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, Fitted, MachineModel
+
+MOTION = ("position", "velocity", "acceleration")
+IMPOSED = "1e300"  # kg: along an imposed motion friction slides wherever it moves
+TEMPLATES = Environment(
+    loader=PackageLoader("twin.export"), undefined=StrictUndefined, trim_blocks=True,
+    lstrip_blocks=True, keep_trailing_newline=True,
+)  # fmt: skip
+TEMPLATES.filters.update(
+    identifier=identifier,
+    plain=lambda text: text.replace("*/", "* /").replace("\\", "/"),  # it cannot end a comment
+    quoted=quoteattr,
+)
+
+
+@dataclass(frozen=True)
+class LawCode:
+    """An effect with its values, and the C function of its law."""
+
+    fitted: Fitted
+    function: str
+
+    @property
+    def effect(self) -> Effect:
+        return self.fitted.effect
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return self.effect.name
+
+
+@dataclass(frozen=True)
+class AxisCode:
+    """The function of one axis, as the templates write it."""
+
+    name: str
+    """Of the axis in the model."""
+    prefix: str
+    """With which its C names begin: PREFIX_force, PREFIX_state."""
+    axis: AxisModel
+    """With the effects that are kept."""
+    laws: tuple[LawCode, ...]
+    """The effects in the order of a sample."""
+    period: float
+    """s, from one call to the next."""
+    ahead: float
+    """By how much the setpoint has to come early, s."""
+    ends: dict[str, tuple[float, float]]
+    """90 % intervals by the label of a parameter."""
+
+    @property
+    def reads_other(self) -> bool:
+        """Whether the motion of the other axis is an argument too."""
+        return any(law.effect.reads_other_axis for law in self.laws)
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Of the function, after the state."""
+        return (*MOTION, *(f"other_{m}" for m in MOTION if self.reads_other))
+
+    @property
+    def by_current(self) -> bool:
+        """Whether there is a function for the current too."""
+        return self.axis.hardware.force_constant != 1.0
+
+    @property
+    def rubs_by_itself(self) -> bool:
+        """Whether friction depends on the force that moves the axis."""
+        return any(law.effect.reads("U") for law in self.of("MODIFIER", "FRICTION"))
+
+    @property
+    def standing(self) -> list[LawCode]:
+        """Attached masses that move against the net force, such as a base."""
+        return [law for law in self.of("STRUCTURE") if law.effect.reads("NET")]
+
+    @property
+    def riding(self) -> list[LawCode]:
+        """Attached masses that move with the axis."""
+        return [law for law in self.of("STRUCTURE") if not law.effect.reads("NET")]
+
+    @property
+    def steps(self) -> int:
+        """In which the attached masses take a period."""
+        return 1 if self.standing else ceil(self.period / LONGEST_STEP - 1e-9)
+
+    def of(self, *kinds: str) -> list[LawCode]:
+        """The effects of some kinds, kind by kind."""
+        return [law for kind in kinds for law in self.laws if law.effect.kind is Kind[kind]]
+
+    def signature(self, what: str) -> str:
+        """Of its function for force or current."""
+        given = ", ".join(f"double {n}" for n in self.arguments)
+        return f"double {self.prefix}_{what}({self.prefix}_state *state, {given})"
+
+
+@dataclass(frozen=True)
+class CSource:
+    """The two files of a machine, and what they lack of it."""
+
+    name: str
+    header: str
+    source: str
+    axes: tuple[AxisCode, ...]
+    approximated: tuple[Remark, ...]
+    lost: tuple[Remark, ...]
+
+    @property
+    def kept(self) -> dict[str, tuple[str, ...]]:
+        """By axis, what is kept as it is."""
+        less, kept = {(r.axis, r.part) for r in (*self.approximated, *self.lost)}, {}
+        for a in self.axes:
+            effects = (n for n in a.axis.names if (a.name, n) not in less)
+            kept[a.name] = (a.axis.units.mass_name, *effects)
+        return kept
+
+
+def c_source(model: MachineModel) -> CSource:
+    """The feedforward of a machine; raises InputError where the motion of an axis is imposed."""
+    if model.joints:
+        raise InputError(
+            f"{model.name}: its axes are joints of {model.mjcf_name}, whose forces depend on the "
+            "motion of all of them; give a model of one axis with a mass"
+        )
+    model.require_mass()
+    name, names, laws = identifier(model.name), axis_identifiers(model), CLaws()
+    axes, approximated, lost = list[AxisCode](), list[Remark](), list[Remark]()
+    for axis_name, axis in model.axes.items():
+        found = followed(axis)
+        made, left = [], dict(found.lost)
+        for f in sorted(found.axis.effects, key=lambda f: f.effect.kind.value):
+            try:
+                CLaws().law(f.effect.law)  # so that half a law is not left among the others
+                made.append(LawCode(f, laws.law(f.effect.law)))
+            except CannotTranslate as error:
+                left[f.effect.name] = f"its law cannot be written in C: {error}"
+        nearly = {n: t for n, t in found.approximated.items() if n not in left}
+        for law in made:
+            if law.effect.kind is Kind.STRUCTURE and model.period > LONGEST_STEP:
+                nearly[law.name] = "the acceleration is held from one call to the next"
+        approximated += [Remark(axis_name, *item) for item in nearly.items()]
+        lost += [Remark(axis_name, *item) for item in left.items()]
+        intervals = model.intervals.get(axis_name)
+        axes.append(
+            AxisCode(
+                axis_name, f"{name}_{names[axis_name]}", found.axis, tuple(made), model.period,
+                found.ahead(model.period), dict(intervals.ends) if intervals else {},
+            )
+        )  # fmt: skip
+    header, source = (
+        TEMPLATES.get_template(f"model.{kind}.j2").render(
+            model=model, name=name, axes=axes, approximated=approximated, lost=lost,
+            laws=laws.text, slots=SLOTS, io_size=IO_SIZE, imposed=IMPOSED,
+        )
+        for kind in ("h", "c")
+    )  # fmt: skip
+    return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:

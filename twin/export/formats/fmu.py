@@ -15,11 +15,11 @@ import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from twin.export import Exported, Exporter, Remark, identifier
-from twin.export.c_source import AxisCode, CSource, c_source
+from twin.export.formats.c import TEMPLATES, AxisCode, c_source
 from twin.logs import Log
+from twin.logs.writer import software_version
 from twin.model.machine import MachineModel
 
 WRAPPER = Path(__file__).parent.parent / "fmi2.c"
@@ -33,10 +33,20 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     made = c_source(model)
     wrapper = WRAPPER.read_text(encoding="utf-8")
     guid = hashlib.sha256((made.header + made.source + wrapper).encode()).hexdigest()[:32]
-    sources = {"fmi2.c": wrapper, "model.h": _model_header(made, guid)}
+    inputs = [signal for a in made.axes for signal in _inputs(a)]
+    outputs = [signal for a in made.axes for signal in _outputs(a)]
+    header, description = (
+        TEMPLATES.get_template(f"{name}.j2").render(
+            model=model, made=made, guid=guid, inputs=inputs, outputs=outputs,
+            units=dict.fromkeys(unit for _, unit, _ in [*inputs, *outputs]),
+            version=software_version(),
+        )
+        for name in ("fmu.h", "modelDescription.xml")
+    )  # fmt: skip
+    sources = {"fmi2.c": wrapper, "model.h": header}
     sources |= {f"{made.name}.c": made.source, f"{made.name}.h": made.header}
     binary, why = _compiled(made.name, sources)
-    files: dict[str, str | bytes] = {"modelDescription.xml": _description(model, made, guid)}
+    files: dict[str, str | bytes] = {"modelDescription.xml": description}
     files |= {f"sources/{name}": text for name, text in sources.items()}
     files |= binary
     stream = io.BytesIO()
@@ -58,74 +68,7 @@ def _outputs(a: AxisCode) -> list[Signal]:
     units, name = a.axis.units, identifier(a.name)
     force = (f"{name}_{units.words('force')}", units.force, "that follows the setpoint")
     current = (f"{name}_current", "A", "the same as a current")
-    return [force, *([current] if a.axis.hardware.force_constant != 1.0 else [])]
-
-
-def _model_header(made: CSource, guid: str) -> str:
-    """What fmi2.c needs of the machine."""
-    members = "\n".join(f"    {a.prefix}_state {identifier(a.name)};" for a in made.axes)
-    calls, at, to = [], 0, 0
-    for a in made.axes:
-        given = ", ".join(f"in[{at + i}]" for i in range(len(a.arguments)))
-        calls.append(f"    out[{to}] = {a.prefix}_force(&state->{identifier(a.name)}, {given});")
-        if len(_outputs(a)) > 1:
-            calls.append(f"    out[{to + 1}] = out[{to}] / {a.axis.hardware.force_constant!r};")
-        at, to = at + len(a.arguments), to + len(_outputs(a))
-    return "\n".join(
-        [
-            f'#include "{made.name}.h"\n',
-            f'#define MODEL_GUID "{guid}"',
-            f"#define MODEL_PERIOD {made.name.upper()}_PERIOD",
-            f"enum {{ N_INPUTS = {at}, N_OUTPUTS = {to} }};\n",
-            f"typedef struct {{\n{members}\n}} model_state;\n",
-            "static void model_call(model_state *state, const double *in, double *out)\n{",
-            *calls,
-            "}\n",
-        ]
-    )
-
-
-def _description(model: MachineModel, made: CSource, guid: str) -> str:
-    """modelDescription.xml."""
-    from twin.logs.writer import software_version
-
-    inputs = [signal for a in made.axes for signal in _inputs(a)]
-    outputs = [signal for a in made.axes for signal in _outputs(a)]
-    units = dict.fromkeys(unit for _, unit, _ in [*inputs, *outputs])
-    variables = []
-    for reference, (name, unit, what) in enumerate([*inputs, *outputs]):
-        causality = "input" if reference < len(inputs) else "output"
-        start = ' start="0"' if causality == "input" else ""
-        variables.append(
-            f'    <ScalarVariable name="{name}" valueReference="{reference}" '
-            f'description={quoteattr(what)} causality="{causality}" variability="discrete">\n'
-            f'      <Real unit={quoteattr(unit)}{start}/>\n    </ScalarVariable>'
-        )  # fmt: skip
-    unknown = [f'      <Unknown index="{len(inputs) + i + 1}"/>' for i in range(len(outputs))]
-    return "\n".join(
-        [
-            '<?xml version="1.0" encoding="UTF-8"?>',
-            f'<fmiModelDescription fmiVersion="2.0" modelName={quoteattr(model.name)} '
-            f'guid="{guid}" generationTool="proton-twin {software_version()}" '
-            'numberOfEventIndicators="0">',
-            f'  <CoSimulation modelIdentifier="{made.name}" '
-            'canHandleVariableCommunicationStepSize="true" '
-            'canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" '
-            'canSerializeFMUstate="true">',
-            '    <SourceFiles>\n      <File name="fmi2.c"/>',
-            f'      <File name="{made.name}.c"/>\n    </SourceFiles>\n  </CoSimulation>',
-            "  <UnitDefinitions>",
-            *(f"    <Unit name={quoteattr(unit)}/>" for unit in units),
-            f'  </UnitDefinitions>\n  <DefaultExperiment stepSize="{model.period!r}"/>',
-            "  <ModelVariables>",
-            *variables,
-            "  </ModelVariables>\n  <ModelStructure>\n    <Outputs>",
-            *unknown,
-            "    </Outputs>\n    <InitialUnknowns>",
-            *unknown,
-            "    </InitialUnknowns>\n  </ModelStructure>\n</fmiModelDescription>\n",
-        ]
-    )
+    return [force, *([current] if a.by_current else [])]
 
 
 def _compiled(name: str, sources: Mapping[str, str]) -> tuple[dict[str, bytes], str]:
