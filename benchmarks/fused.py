@@ -12,8 +12,15 @@ import numba
 import numpy as np
 
 from benchmarks.timing import Array
-from twin.core.control import RESOLUTION, command, measure
-from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
+from twin.core.loop import (
+    COMMAND_COLUMN,
+    POSITION_COLUMN,
+    READING_COLUMN,
+    RESOLUTION,
+    VELOCITY_COLUMN,
+    command,
+    measure,
+)
 from twin.model.machine import AxisModel
 
 EFFECTS = ("lugre", "cable_slab", "roller_spikes")

@@ -16,7 +16,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import Array, interleaved, ratio
 from twin.logs import AxisLog, Log, read_log, write_log
-from twin.logs.messages import AXIS_SAMPLE, file_descriptor_set
+from twin.logs.topics import AXIS_SAMPLE, file_descriptor_set
 
 SAMPLES = 200_000
 SIGNALS = ("setpoint_position", "setpoint_velocity", "position", "force")

@@ -18,8 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from twin.core.control import Controller
-from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
+from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.core.walks import walk
 from twin.effects import load_catalogue
 from twin.experiments.trajectory import Setpoint

@@ -16,7 +16,7 @@ from identify.experiment_design.planting import draw_effect, hidden_part, other_
 from identify.output.numbers import quantity
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.output.words.commands import Source
+from identify.output.words.plan import Source
 from identify.results.addition import Addition
 from identify.results.results import Diagnosis, Feedforward, OnMachine
 from twin.effect import Effect, Kind
@@ -28,7 +28,7 @@ from twin.logs import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.numbers import require_seed
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent
 from twin.simulator import ReducedSimulator
 
 DURATION = 12.0  # s of each log

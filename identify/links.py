@@ -30,14 +30,14 @@ from identify.estimation.intervals import half_widths_by
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, least_t, part_of, taken
-from identify.selection.confidence import confidence
 from identify.selection.controls import Columns, Trial, unit_penalty
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import confidence
 from identify.selection.trying import NEARLY_ALL
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import MachineModel
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent
 from twin.signals import Array
 
 if TYPE_CHECKING:

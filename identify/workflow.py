@@ -60,8 +60,7 @@ from twin.memory import trim_memory
 from twin.model.file import as_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.written import inertial
-from twin.parallel import parallel
-from twin.progress import Progress, silent, within
+from twin.parallel import Progress, parallel, silent, within
 
 Logs = Mapping[str, Log]
 Model = MachineModel | str | Path

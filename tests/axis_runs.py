@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from effect_runs import CATALOGUE
 
-from twin.core.control import Controller
-from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN
+from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array

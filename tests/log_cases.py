@@ -10,7 +10,7 @@ from mcap.writer import Writer
 
 from twin.logs import FIELDS, AxisLog, Log
 from twin.logs.log import Array
-from twin.logs.messages import file_descriptor_set, tag
+from twin.logs.topics import file_descriptor_set, tag
 
 RATE = 10_000.0
 

@@ -9,7 +9,7 @@ from mcap_bytes import log_file
 
 from twin.errors import InputError
 from twin.logs import Log, read_log
-from twin.logs.messages import file_descriptor_set, tag
+from twin.logs.topics import file_descriptor_set, tag
 
 MS = 1_000_000
 RATED = {"sample_rate_hz": "1000"}

@@ -1,4 +1,7 @@
-"""Work spread over threads: the compiled laws, FFTs and linear algebra release Python's lock."""
+"""Work spread over threads, and how far it is, told by whoever does it to whoever shows it.
+
+The compiled laws, FFTs and linear algebra release Python's lock.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,20 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from threading import Lock
 from typing import Literal, TypeVar
+
+Progress = Callable[[str, int, int], None]  # what is being done, how much of it, of how much
+
+
+def silent(what: str, done: int, total: int) -> None:
+    """Progress that is not shown."""
+
+
+def within(progress: Progress, where: str) -> Progress:
+    """The progress of a part of some work; where: which part."""
+    return lambda what, done, total: progress(f"{where}, {what}", done, total)
+
+
+# --- work -----------------------------------------------------------------------------------------
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.compiled import S_AT
-from twin.core.control import Controller, gain_table
-from twin.core.loop import N_SIGNALS, run_mujoco, run_reduced
+from twin.core.loop import N_SIGNALS, Controller, gain_table, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory import AnySetpoint, Setpoint

@@ -2,7 +2,7 @@
 
 Answers of the self-test, and rows that `benchmarks foreign` and `benchmarks withheld` wrote with
 -o, are halved machine by machine. The tables are fitted on one half and judged on the other, and
-the other way round; then those of all of them are printed for identify/selection/confidence.py.
+the other way round; then those of all of them are printed for identify/selection/findings.py.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from benchmarks.selftest.design import DEVELOPMENT, FULL, run_all
 from benchmarks.selftest.tally import answers_of
 from benchmarks.selftest.trial import Answer, TrialResult
 from benchmarks.selftest.words import tell
-from identify.selection.confidence import Level, read
-from identify.selection.findings import FindingKind
+from identify.selection.findings import FindingKind, Level, read
 
 LEAST_ANSWERS = 30  # to a level: a rate of them is known to some 10 points
 SPLIT = 1  # seed of the halves

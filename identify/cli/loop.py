@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from identify.cli.command import Said, require_apart
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import Said, progress_on_stderr, require_apart
 from identify.cli.shared import (
     ASSUMES,
     CheckedRecordings,
@@ -40,7 +39,7 @@ from twin.errors import InputError
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
-    from identify.output.words.commands import Source
+    from identify.output.words.plan import Source
     from identify.results.addition import Addition, CorrectedBody
     from identify.results.results import Comparison, Diagnosis, FitResult, OnMachine, SimulationFit
     from twin.effects import Catalogue
@@ -165,7 +164,7 @@ def diagnose(
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
     """The command as typed, and what the next one takes over of it."""
-    from identify.output.words.commands import Source
+    from identify.output.words.plan import Source
 
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
     own = [text for file in effects or () for text in ("--effects", str(file))]

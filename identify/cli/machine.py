@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from identify.cli.command import Said
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import Said, progress_on_stderr
 from identify.cli.shared import (
     CheckedRecordings,
     Effects,
@@ -187,7 +186,7 @@ def info(
     from twin.checks.long import log_info
 
     if out is not None:
-        from twin.importers.export import write_table
+        from twin.importers.table import write_table
         from twin.logs import read_log
 
         if len(logs) > 1:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from identify.cli.command import Commands, Said
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import Commands, Said, progress_on_stderr
 from twin.errors import InputError
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
-from twin.core.control import Controller, gain_table
-from twin.core.loop import N_SIGNALS, POSITION_COLUMN
+from twin.core.loop import N_SIGNALS, POSITION_COLUMN, Controller, gain_table
 from twin.core.native import Table
 from twin.core.walks import walk
 from twin.effect import Kind

@@ -37,8 +37,7 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
-from twin.parallel import spread
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent, spread
 from twin.signals import Array
 from twin.simulator import quickest
 

@@ -42,8 +42,7 @@ from twin.experiments.trajectory import require_length
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.file import as_model
 from twin.model.machine import MachineModel
-from twin.parallel import parallel
-from twin.progress import Progress, silent, within
+from twin.parallel import Progress, parallel, silent, within
 
 DURATION = 20.0  # s of a planned experiment
 

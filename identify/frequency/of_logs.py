@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.analysis.first_model import first_model
-from identify.frequency.loop import Loop, loop_of
-from identify.frequency.plant import Banded, Plant, plant_of
+from identify.frequency.plant import Banded, Loop, Plant, loop_of, plant_of
 from identify.frequency.response import Record, Response, response
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.follow import replay
@@ -19,7 +18,7 @@ from twin.logs import Log
 from twin.logs.log import AxisLog
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent
 from twin.simulator import quickest
 
 

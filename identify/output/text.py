@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, change, number, quantity
-from identify.output.words.addition import errors_of_step, proved_in_words, step_in_words
-from identify.output.words.body import body_in_words, corrected_in_words
-from identify.output.words.commands import UNKNOWN, Source, names_of
+from identify.output.words.addition import (
+    body_in_words,
+    corrected_in_words,
+    errors_of_step,
+    proved_in_words,
+    step_in_words,
+)
 from identify.output.words.diagnosis import (
     all_found,
     named_errors_in_words,
@@ -31,10 +35,13 @@ from identify.output.words.fit import (
     over_floor,
 )
 from identify.output.words.plan import (
+    UNKNOWN,
+    Source,
     all_not_run_in_words,
     experiment_in_words,
     gap_in_words,
     in_order,
+    names_of,
     question_in_words,
     supposed_in_words,
 )

@@ -19,7 +19,7 @@ from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.model.machine import Fitted
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent
 
 
 class Verdict(Enum):

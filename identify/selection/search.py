@@ -43,7 +43,7 @@ from identify.selection.trying import (
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.memory import trim_memory
-from twin.progress import Progress, silent, within
+from twin.parallel import Progress, silent, within
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,8 +36,7 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.memory import trim_memory
 from twin.model.machine import AxisModel
-from twin.parallel import spread
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent, spread
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is

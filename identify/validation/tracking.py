@@ -14,14 +14,13 @@ from functools import reduce
 import numpy as np
 
 from identify.estimation.evidence import rms
-from twin.core.control import Controller
-from twin.core.loop import POSITION_COLUMN
+from twin.core.loop import POSITION_COLUMN, Controller
 from twin.effect import Kind
 from twin.experiments.trajectory import Setpoint
 from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
-from twin.progress import Progress, silent
+from twin.parallel import Progress, silent
 from twin.signals import Array, between, moving_mean, rate
 from twin.simulator import ReducedSimulator, run
 

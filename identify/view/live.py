@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from identify.view.panel import at_time, panel, strips
 from identify.view.replay import Replay
 from identify.view.stage import Stage
+from identify.view.video import at_time, panel, strips
 from twin.errors import InputError
 
 SPACE, RIGHT, LEFT, DOWN, UP, HOME = 32, 262, 263, 264, 265, 268  # keys, as the viewer numbers them

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import progress_on_stderr
 from identify.output.answers.answer import plain
 from studies.thesis.reproduction import reproduce
 from twin.errors import InputError

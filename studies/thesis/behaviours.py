@@ -14,7 +14,7 @@ import numpy as np
 from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
 from studies.thesis.study import Array, Numbers, followed, seed_of
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.experiments.kinds import Staircase
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint

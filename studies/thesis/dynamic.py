@@ -30,7 +30,7 @@ from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers, friction_of
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.effect import Kind
 from twin.experiments.kinds import OpenLoopSine, Reversals
 from twin.logs import AxisLog, Log

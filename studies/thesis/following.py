@@ -15,7 +15,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.intervals import scatter
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.experiments.follow import replay
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log

@@ -21,8 +21,7 @@ from studies.thesis import cable, dynamic, future, models, residuals, simulation
 from studies.thesis.study import Chapter, Found
 from twin.errors import InputError
 from twin.files import write_atomically
-from twin.parallel import parallel
-from twin.progress import Progress, silent
+from twin.parallel import Progress, parallel, silent
 from twin.threads import one_for_matrices
 
 CHAPTERS: Mapping[str, Chapter] = {

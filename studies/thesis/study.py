@@ -15,7 +15,7 @@ from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
 from identify.output.report.page import Block
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.experiment import Experiment

@@ -11,16 +11,16 @@ import sys
 import pytest
 from planted_logs import SLIDE, Ride, begun, few, having, logged
 
-from identify.cli.progress import Part, roughly
+from identify.cli.command import Part, roughly
 from identify.selection.diagnosis import diagnose_axis
-from twin.progress import within
+from twin.parallel import within
 
 LINE = re.compile(r"twin: .+ \(\d+ (s|min) so far\)")
 DIAGNOSIS = """
 import json
 from dataclasses import replace
 from identify import workflow
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import progress_on_stderr
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
 from twin.model.file import load_model
@@ -37,7 +37,7 @@ print(json.dumps(list(found.axes)))
 # Two of ten parts, then one that takes long and says nothing.
 PLANTED = """
 import time
-from identify.cli.progress import progress_on_stderr
+from identify.cli.command import progress_on_stderr
 with progress_on_stderr(first={first}, every=0.2) as progress:
     for done in range(3):
         progress("digging", done, 10)

@@ -5,8 +5,7 @@ import pytest
 from constructed import effect, two_waves
 
 from twin import simulator
-from twin.core.control import Controller, gain_table
-from twin.core.loop import N_SIGNALS, READING_COLUMN
+from twin.core.loop import N_SIGNALS, READING_COLUMN, Controller, gain_table
 from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at

@@ -9,8 +9,13 @@ from __future__ import annotations
 from twin.checks.axis import Axis
 from twin.checks.breaks import check_breaks, check_outliers
 from twin.checks.channels import check_crossed, check_timing, check_units
-from twin.checks.command import check_command, check_saturation
-from twin.checks.content import check_assumed, check_content, check_excitation
+from twin.checks.content import (
+    check_assumed,
+    check_command,
+    check_content,
+    check_excitation,
+    check_saturation,
+)
 from twin.checks.report import CheckReport, Fault, Finding, Severity
 from twin.logs.log import Log
 

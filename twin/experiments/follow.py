@@ -12,8 +12,13 @@ from copy import deepcopy
 import numpy as np
 from numpy.random import Generator
 
-from twin.core.control import Controller
-from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, READING_COLUMN, VELOCITY_COLUMN
+from twin.core.loop import (
+    COMMAND_COLUMN,
+    POSITION_COLUMN,
+    READING_COLUMN,
+    VELOCITY_COLUMN,
+    Controller,
+)
 from twin.errors import InputError
 from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.logs import AxisLog, Log

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.entries import near
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment, OneAxis, machine_limits

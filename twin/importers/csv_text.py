@@ -23,9 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.mapping import ImportMap
+from twin.importers.mapping import ImportMap, is_unit, raw_unit
 from twin.importers.table import Table, chosen, parsing
-from twin.importers.units import is_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 TIME = "time"

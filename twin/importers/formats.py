@@ -1,10 +1,17 @@
-"""MATLAB, HDF5, JSON, Parquet and TDMS, each as columns by name.
+"""MATLAB, HDF5, JSON, Parquet, TDMS and MCAP of other writers, each as columns by name.
 
 HDF5: a dataset is named by its path; fields of a compound dataset as ``path/field``. JSON: arrays
 by name, a matrix (``name[1]``, ``name[2]``, ...; a list of as many names beside it names its
 columns), or one object a row. Parquet: an empty cell is NaN, which the importer refuses. TDMS of
 LabVIEW: a channel is named ``group/channel``; its waveform may state the rate. MATLAB: versions 4
 to 7.2 through SciPy, 7.3 as the HDF5 file it is; a field of a struct is named ``struct.field``.
+
+MCAP of other writers: protobuf, JSON and ROS 2 messages, one column a number in a message.
+
+A column is ``topic.field``, ``topic.field.inner``, or ``topic.field[1]`` for the first of an array;
+where a message names the entries of its arrays, as sensor_msgs/JointState does, or an entry has a
+name of its own, also ``topic.field.name``. ``topic.log_time`` and time stamps in a message are
+times since 1970.
 """
 
 from __future__ import annotations
@@ -12,12 +19,15 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.io
+from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from twin.errors import InputError
@@ -33,6 +43,16 @@ from twin.importers.table import (
     split_columns,
 )
 from twin.isolated import isolated
+from twin.logs.container import (
+    IN_CHUNKS,
+    Damaged,
+    FileBytes,
+    Inflation,
+    McapFile,
+    open_chunk,
+    record_at,
+)
+from twin.logs.topics import Topics
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 ROWS = "data"  # what the rows of a bare list are called in JSON
@@ -194,3 +214,125 @@ def _load(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
         content = scipy.io.loadmat(path, simplify_cells=True)
     columns = _flat("", {k: v for k, v in content.items() if not k.startswith("__")})
     return {name: columns[name] for name in chosen(names, columns)}
+
+
+# --- MCAP of other writers ------------------------------------------------------------------------
+
+LOG_TIME = "log_time"
+_STAMPS = (("sec", "nanosec"), ("seconds", "nanos"))  # ROS 2, protobuf
+
+_MODULES = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
+_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+
+
+def read_mcap(path: Path, mapping: ImportMap) -> Table:
+    """Columns of an MCAP file; raises InputError."""
+    wanted = mapping.column_names()
+    held: dict[str, array] = {}
+    stamps: set[str] = set()
+    seen: dict[str, None] = {}
+    with parsing("MCAP"):
+        for topic, time, decoded in _messages(path, wanted):
+            values = _of_message(topic, decoded)
+            values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
+            seen.update(dict.fromkeys(values))
+            for name in wanted or values:
+                if name in values:
+                    value = values[name]
+                    if isinstance(value, np.datetime64):
+                        stamps.add(name)
+                        value = int(value.astype(np.int64))
+                    held.setdefault(name, array("q" if name in stamps else "d")).append(value)
+                elif name in held and name.startswith(f"{topic}."):
+                    raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
+    require_columns(wanted, seen)
+    kinds = {name: "datetime64[ns]" if name in stamps else None for name in wanted or held}
+    return Table({name: np.array(held[name], kind) for name, kind in kinds.items()})
+
+
+def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+    """Topic, log time in ns and message; of topics not wanted the first alone. Raises Damaged."""
+    topics, shown = Topics(), Counter[int]()
+    decoders: dict[int, Callable[[bytes], Any] | None] = {}
+    with open(path, "rb") as stream:
+        file = McapFile(FileBytes(stream))
+        for opcode, content in _records(file):
+            if opcode != Opcode.MESSAGE:
+                topics.register(opcode, content)
+                continue
+            number, _, time, _ = _MESSAGE_HEAD.unpack_from(content)
+            channel = topics.channels[number]
+            shown[number] += 1
+            if shown[number] > 1 and not any(
+                w.startswith(f"{channel.topic}.") for w in wanted or (f"{channel.topic}.",)
+            ):
+                continue
+            if number not in decoders:
+                encoding, schema = channel.message_encoding, topics.schemas.get(channel.schema_id)
+                decoders[number] = json.loads if encoding == "json" else None
+                if encoding in _MODULES:
+                    factory = extra(_MODULES[encoding]).DecoderFactory()
+                    decoders[number] = factory.decoder_for(encoding, schema)
+            decode = decoders[number]
+            yield channel.topic, time, decode(content[_MESSAGE_HEAD.size :]) if decode else None
+    # a chunk whose kind is damaged is passed over
+    if file.counts is not None and shown.total() != sum(file.counts.values()):
+        raise Damaged(
+            f"{shown.total()} messages where its statistics announce {sum(file.counts.values())}; "
+            "copy the file again"
+        )
+
+
+def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
+    """Opcode and content of schemas, channels and messages, in chunks and outside."""
+    budget = Inflation(file.size)
+    for record in file.records():
+        if record.opcode == Opcode.CHUNK:
+            data, _ = open_chunk(record, budget)
+            offset = 0
+            while offset < len(data):
+                opcode, content, offset = record_at(data, offset)
+                yield opcode, content
+        elif record.opcode in IN_CHUNKS:
+            yield record.opcode, record.content
+
+
+def _of_message(name: str, value: Any, names: Sequence[str] = ()) -> dict[str, Any]:
+    """The numbers and time stamps in a value, by name; names: of its entries, if it has as many."""
+    if isinstance(value, bool | int | float | np.number):
+        return {name: float(value)}
+    out: dict[str, Any] = {}
+    if (fields := _fields(value)) is not None:
+        for seconds, rest in _STAMPS:
+            if fields.keys() == {seconds, rest}:
+                time = int(fields[seconds]) * 10**9 + int(fields[rest])
+                return {name: np.datetime64(time, "ns")}
+        lists = [v for v in fields.values() if _are_entries(v) and len(v)
+                 and all(isinstance(text, str) for text in v)]  # fmt: skip
+        for key, inner in fields.items():
+            out |= _of_message(f"{name}.{key}", inner, lists[0] if lists else ())
+    elif _are_entries(value):
+        for k, entry in enumerate(value):
+            texts = [v for v in (_fields(entry) or {}).values() if isinstance(v, str)]
+            called = names[k : k + 1] if len(names) == len(value) else texts  # as that of a joint
+            keys = [f"{name}.{called[0]}"] if len(called) == 1 and called[0] else []
+            for key in (f"{name}[{k + 1}]", *keys):
+                out |= _of_message(key, entry)
+    return out
+
+
+def _are_entries(value: Any) -> bool:
+    """Whether it is a list, of whatever kind a library makes them."""
+    return hasattr(value, "__len__") and not isinstance(value, str | bytes | Mapping)
+
+
+def _fields(value: Any) -> Mapping[str, Any] | None:
+    """The fields of a message; None where it is none."""
+    if isinstance(value, Mapping):
+        return value
+    if hasattr(value, "__len__"):
+        return None
+    if hasattr(value, "DESCRIPTOR"):
+        return {f.name: getattr(value, f.name) for f in value.DESCRIPTOR.fields}
+    slots = getattr(value, "__slots__", None)
+    return None if slots is None else {name: getattr(value, name) for name in slots}

@@ -15,9 +15,17 @@ from mcap.records import Attachment, Metadata
 from twin.errors import InputError, at
 from twin.logs.container import Damaged, Inflation, McapFile, Record, open_chunk, open_mcap
 from twin.logs.log import Array, AxisLog, Log
-from twin.logs.messages import Block
-from twin.logs.series import Series, seconds
-from twin.logs.topics import AXIS_PREFIX, TRUTH_PREFIX, Topic, Topics, axis_of, positive_number
+from twin.logs.topics import (
+    AXIS_PREFIX,
+    TRUTH_PREFIX,
+    Block,
+    Series,
+    Topic,
+    Topics,
+    axis_of,
+    positive_number,
+    seconds,
+)
 
 METADATA_NAME = "twin"
 CHECKSUM = "checksum"  # entry of the metadata, as their record has none

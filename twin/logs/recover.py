@@ -43,9 +43,15 @@ from twin.logs.container import (
 )
 from twin.logs.decode import EVERYTHING, Extras, assembled, common_rate, log_parts
 from twin.logs.log import Array, Log, joined
-from twin.logs.messages import Block, sample_times
-from twin.logs.series import require_even, require_finite, seconds
-from twin.logs.topics import Topic, Topics
+from twin.logs.topics import (
+    Block,
+    Topic,
+    Topics,
+    require_even,
+    require_finite,
+    sample_times,
+    seconds,
+)
 from twin.logs.writer import write_parts
 
 GAP = "a gap separates them from the longer run"

@@ -27,17 +27,20 @@ from twin.files import atomic_writer, recording
 from twin.logs.container import MAGIC
 from twin.logs.decode import CHECKSUM, METADATA_NAME, SCHEMA_VERSION, checksum
 from twin.logs.log import Array, AxisLog, Log, in_multiples
-from twin.logs.messages import (
+from twin.logs.topics import (
+    AXIS_PREFIX,
     AXIS_SAMPLE,
     AXIS_TRUTH,
     FIELD_NUMBERS,
+    IDENTIFIER,
+    TRUTH_PREFIX,
     MessageLayout,
+    complete_units,
     file_descriptor_set,
     numbered,
     sample_times,
+    seconds,
 )
-from twin.logs.series import seconds
-from twin.logs.topics import AXIS_PREFIX, IDENTIFIER, TRUTH_PREFIX, complete_units
 from twin.numbers import first_not_finite
 
 CHUNK_BYTES = 1 << 20  # of the samples in all chunks of a stretch, as the format recommends

@@ -18,12 +18,13 @@ from identify.output.answers.fits import (
     estimate_entries,
 )
 from identify.output.words.diagnosis import (
+    advice,
     model_change_in_words,
     not_named_in_words,
+    pairs_in_words,
     said_of,
     why_not,
 )
-from identify.output.words.findings import advice, pairs_in_words
 from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
 from identify.results.addition import Addition, CorrectedBody
 from identify.results.results import Diagnosis

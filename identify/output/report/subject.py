@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from identify.dataset.dataset import Role
-from identify.output.words.commands import UNKNOWN, Source, names_of
 from identify.output.words.diagnosis import Said, all_found, said_of
+from identify.output.words.plan import UNKNOWN, Source, names_of
 from identify.results.addition import Addition
 from identify.results.results import UNTOLD, AxisSummary, Comparison, Diagnosis, OnMachine
 from identify.results.signals import Signals, signals_of

@@ -28,8 +28,7 @@ from benchmarks.selftest.words import (
     target_in_words,
     trial_in_words,
 )
-from identify.selection.confidence import BY_PART, BY_T, Level, confidence, read
-from identify.selection.findings import FindingKind
+from identify.selection.findings import BY_PART, BY_T, FindingKind, Level, confidence, read
 
 FOREIGN = next(iter(OUTSIDE))
 

@@ -15,8 +15,7 @@ from scipy.signal import butter, csd, lfilter
 
 import identify
 from benchmarks.second_simulator.two_masses import CELLS, TwoMasses, multisine, wandering
-from identify.frequency.loop import loop_of
-from identify.frequency.plant import Banded, plant_of
+from identify.frequency.plant import Banded, loop_of, plant_of
 from identify.frequency.response import Record, response
 from identify.output.as_json import answer_of
 from tests.cli_runs import refusal, twin

@@ -17,8 +17,13 @@ from identify.output.report.answer import notes
 from identify.output.report.page import Tone
 from identify.output.report.residual import regions
 from identify.output.report.subject import Subject
-from identify.output.words.diagnosis import VERDICTS, remarks_on
-from identify.output.words.findings import advice, all_in_words, finding_in_words
+from identify.output.words.diagnosis import (
+    VERDICTS,
+    advice,
+    all_in_words,
+    finding_in_words,
+    remarks_on,
+)
 from identify.output.words.fit import refit_in_words
 from identify.output.words.plan import next_step_in_words
 from identify.output.words.residual import place_in_words, region_in_words

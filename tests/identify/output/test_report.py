@@ -20,8 +20,8 @@ from identify.output.numbers import arrow, quantity, typeset
 from identify.output.report.explorer import coordinate_of_answer, shown_of
 from identify.output.report.page import Chart
 from identify.output.report.residual import regions
-from identify.output.words.commands import Source
 from identify.output.words.diagnosis import verdict_in_words
+from identify.output.words.plan import Source
 from identify.results.signals import Signals
 from identify.workflow import on_machine
 from twin.effects import load_catalogue

@@ -15,9 +15,8 @@ from scipy.signal import lfilter
 
 import identify
 from identify.output.as_json import json_of
-from identify.output.words.commands import next_commands
-from identify.output.words.diagnosis import verdict_in_words
-from identify.output.words.findings import finding_in_words
+from identify.output.words.diagnosis import finding_in_words, verdict_in_words
+from identify.output.words.plan import next_commands
 from identify.selection.curves import shapes_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind

@@ -18,7 +18,7 @@ from scipy.io import loadmat
 from identify.testing import assert_agree
 from identify.workflow import agree
 from studies.thesis.following import closed_loop_errors, identified, twin_of
-from twin.core.control import Controller
+from twin.core.loop import Controller
 from twin.effects import load_catalogue
 from twin.experiments.follow import recorded_setpoint
 from twin.importers import import_log, load_mapping

@@ -6,7 +6,7 @@ from check_drive import axis_of, drive, findings, motion, stated
 
 from twin.checks import Fault, Severity, check_log
 from twin.checks.axis import held_samples
-from twin.checks.command import off_course
+from twin.checks.content import off_course
 from twin.checks.explain import find_trend
 from twin.logs import AxisLog, Log
 

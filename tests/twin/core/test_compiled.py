@@ -51,7 +51,7 @@ CHANGES = {
         "now = slope(velocity, k, block)",
         "now = 2.0 * slope(velocity, k, block)",
     ),
-    "core/control.py": ("gains[KP] *", "2.0 * gains[KP] *"),
+    "core/loop.py": ("gains[KP] *", "2.0 * gains[KP] *"),
 }
 
 

@@ -18,7 +18,7 @@ from mcap_bytes import of
 from twin.errors import InputError
 from twin.importers import import_log
 from twin.logs import Log
-from twin.logs.series import instant
+from twin.logs.topics import instant
 
 COUNT = 400
 T = np.arange(COUNT) * 1e-3

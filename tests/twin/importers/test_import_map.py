@@ -7,7 +7,7 @@ import pytest
 
 from twin.errors import InputError
 from twin.importers import ImportMap, load_mapping
-from twin.importers.units import find_unit
+from twin.importers.mapping import find_unit
 
 GOOD = """
 sample_rate = 1000.0

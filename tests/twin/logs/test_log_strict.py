@@ -26,7 +26,7 @@ from plain_cases import (
 
 from twin.errors import InputError
 from twin.logs import FIELDS, LINEAR_UNITS, ROTARY_UNITS, read_log, recover_log
-from twin.logs.messages import file_descriptor_set
+from twin.logs.topics import file_descriptor_set
 
 OWN = schema()
 FULL = {"position": 1.0, "force": 2.0, "velocity": 3.0, "note": 4.0}

@@ -8,8 +8,7 @@ import pytest
 from axis_runs import BOTH, Stepper
 from effect_runs import CATALOGUE, with_all
 
-from twin.core.control import Controller
-from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN
+from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.effect import Effect
 from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
