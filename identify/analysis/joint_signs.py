@@ -31,8 +31,8 @@ def misassigned(model: MachineModel, log: Log) -> str | None:
 
     model: its axes are joints of a mechanism.
     """
-    # s of all joints together, of the log's beginning that tells it
     least_left = 0.01  # of a joint's squared torque: where none leaves as much, all is right
+    # 240 s of all joints together, of the log's beginning, tell it
     head = _plain(log.part(0, min(round(240.0 / len(model.joints) / log.period), len(log))))
     going = [axis for axis in model.joints if moves(head, axis)]
     parts = _left(model, head, going)

@@ -39,8 +39,8 @@ _moved("selftest", "the self-test", "`make selftest` or `python -m benchmarks se
 
 def main() -> None:
     """Entry point of `twin`: errors are one line, exit code 2."""
-    # One thread for matrices (twin.threads). Read once, as NumPy is imported by a command.
     interrupted = 130  # exit code that typer makes of Ctrl-C, without a word
+    # One thread for matrices (twin.threads). Read once, as NumPy is imported by a command.
     for threads in VARIABLES:
         os.environ.setdefault(threads, "1")
     # Modules are a million objects that stay: to seek cycles among them, again and again while

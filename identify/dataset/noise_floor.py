@@ -130,9 +130,9 @@ def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noi
         "aliasing": size([replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]),
         "force": float(np.sqrt(np.mean([log.force_noise**2 for log in logs]))),
     }
-    # of a part's RMS, by which its estimate misses it; see tests of the noise floor
-    of_rounding = 0.3  # the same of rounding, whose slow steps depend on where the axis turns
-    errors = dict.fromkeys(parts, 0.1) | {"rounding": of_rounding}
+    # of a part's RMS, by which its estimate misses it, see tests of the noise floor; the slow steps
+    # of rounding depend on where the axis turns
+    errors = dict.fromkeys(parts, 0.1) | {"rounding": 0.3}
     errors["aliasing"] += 0.5 * max(n.scatter for n in noises)
     power = sum(size**2 for size in parts.values())
     sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)

@@ -233,8 +233,8 @@ def _causes(force: Array, bases: Mapping[str, Array]) -> tuple[Cause, ...]:
         most = max(shares.values())
         if most < 0.05:  # of the squared force of the difference, for an effect to be a cause of it
             break
-        # Of effects that explain equally much the one with the fewest parameters comes first.
         alike = 0.01  # of that squared force, by which effects that explain equally much may differ
+        # Of effects that explain equally much the one with the fewest parameters comes first.
         equal = [n for n, share in shares.items() if share > most - alike]
         best = min(equal, key=lambda n: bases[n].shape[1])
         causes.append(Cause(best, shares[best], tuple(n for n in equal if n != best)))

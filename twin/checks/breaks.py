@@ -99,9 +99,8 @@ def _stuck(axis: Axis) -> Iterator[Break]:
     """One value for long, with a bend where it begins and where it ends."""
     x = axis.log.position
     same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
-    stuck = 5e-3  # s of one value
-    stuck_samples = 5  # at least, where so long is fewer
-    least = max(stuck * axis.sample_rate, stuck_samples)
+    # s of one value; five samples at least, where so long is fewer
+    least = max(5e-3 * axis.sample_rate, 5)
     bends = axis.jumps > 0.0
     for first, last in zip(same[::2], same[1::2], strict=False):
         at_ends = all(bends[max(end - 3, 0) : end + 1].any() for end in (first, last))
@@ -193,9 +192,8 @@ def uneven_bends(axis: Axis) -> NDArray[np.intp]:
         return bends[:0]
     bends = bends[axis.jumps[bends - 1] < 0.5 * float(np.ptp(axis.log.position))]
     places = 1 + np.count_nonzero(np.diff(bends) > SHORT_GAP * axis.sample_rate)
-    many_bends = 12  # places from which on it is not this and that, but the clock
-    # bends a second at least, where the clock is uneven
-    everywhere = places >= max(many_bends, 1.0 * axis.duration)
+    # a bend a second at least, and so many that it is not this and that, but the clock
+    everywhere = places >= max(12, axis.duration)
     return bends if everywhere else bends[:0]
 
 

@@ -67,9 +67,8 @@ def _steady(axis: Axis) -> Iterator[Finding]:
             "record both with one clock, or import each with time stamps",
         )
         return
-    # s, what friction that the check does not know may account for
-    steady_samples = 1.5  # at least, where so long is fewer
-    least = max(steady_samples / axis.sample_rate, 0.25e-3)
+    # s, what friction that the check does not know may account for; a sample and a half at least
+    least = max(1.5 / axis.sample_rate, 0.25e-3)
     sure = max(least, sure_lag * trend.error) < abs(trend.seconds) < PHYSICAL
     # ripple, backlash and vibration are answered by a loop: of what is left beside the noise a lag
     # takes off 1.7 there

@@ -121,11 +121,9 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
         )
     noise = axis.smoother.acceleration_noise(axis.position_noise)
     rms = float(np.sqrt(np.mean(axis.acceleration**2)))
-    rounding = 1.0  # noise of rounding is at most its step
-    rounded = axis.position_white < rounding * axis.position_step
-    coarse = 0.3  # acceleration noise as a part of the acceleration
-    # the same, where it is the rounding: that is no noise and does not average out
-    if noise >= (0.05 if rounded else coarse) * rms:
+    rounded = axis.position_white < axis.position_step  # noise of rounding is at most its step
+    # as a part of the acceleration; rounding is no noise and does not average out
+    if noise >= (0.05 if rounded else 0.3) * rms:
         yield axis.warning(
             Fault.COARSE_POSITION,
             f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
@@ -198,12 +196,11 @@ def _single(off: Array, least: float) -> NDArray[np.intp]:
     bad = off > least
     if not bad.any():
         return np.flatnonzero(bad)
-    # A sample at a steep edge is off by as much as its neighbours.
     single_sample = 60.0  # times what 99 % of the samples are off their neighbours
+    # A sample at a steep edge is off by as much as its neighbours.
     bad &= off > single_sample * float(np.quantile(off, 0.99))
-    together = np.convolve(bad, np.ones(21), "same")  # samples
-    most_together = 3  # in so many; more are a burst, and no single ones
-    return np.flatnonzero(bad & (together <= most_together))  # noise is no single sample
+    together = np.convolve(bad, np.ones(21), "same")  # in so many samples
+    return np.flatnonzero(bad & (together <= 3))  # more are a burst: noise is no single sample
 
 
 def off_course(signal: Array) -> Array:
@@ -240,9 +237,8 @@ def check_saturation(axis: Axis) -> Iterator[Finding]:
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Start of the first interval at the extreme and length of all, s."""
     starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
-    # s at one value exactly
-    extreme_samples = 5  # at least, where so long is fewer
-    stuck = lengths >= max(5e-3 * axis.sample_rate, extreme_samples)
+    # s at one value exactly; five samples at least, where so long is fewer
+    stuck = lengths >= max(5e-3 * axis.sample_rate, 5)
     if not stuck.any():
         return None
     return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate
@@ -259,9 +255,8 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
     wide = _runs(height >= height.max() - wide_level * noise)[1]
     longest = int(np.argmax(near))
     inside = 0 < starts[longest] < len(height) - near[longest]
-    # s at one value but for noise, after the low-pass
-    level_blocks = 10  # at least, where so long is fewer
-    level = max(20e-3 / smoother.block, level_blocks)
+    # s at one value but for noise, after the low-pass; ten blocks at least, where so long is fewer
+    level = max(20e-3 / smoother.block, 10)
     edge_blocks = 3  # a limited command leaves its level at once, a smooth one slowly
     if not inside or near[longest] < level or wide.max() - near[longest] > edge_blocks:
         return None

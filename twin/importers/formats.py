@@ -165,10 +165,10 @@ def read_mat(path: Path, mapping: ImportMap) -> Table:
         return read_hdf5(path, mapping, separator=".")
     with parsing("MAT"):
         content = content_bytes(path)
-    # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
     shortest = 5.0  # s that a MAT file may take, whatever its size
     slowest = 2e7  # bytes of its content a second
     copies = 4  # of its content, that SciPy and the way back to this process take
+    # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
     seconds, memory = shortest + content / slowest, SMALLEST_TABLE + copies * content
     return Table(isolated(_load, path, mapping.column_names(), seconds=seconds, memory=memory))
 
