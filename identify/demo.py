@@ -17,8 +17,7 @@ from identify.output.numbers import quantity
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
 from identify.output.words.plan import Source
-from identify.results.addition import Addition
-from identify.results.results import Diagnosis, Feedforward, OnMachine
+from identify.results.results import Addition, Diagnosis, Feedforward, OnMachine
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError

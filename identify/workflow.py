@@ -32,16 +32,18 @@ from identify.links import corrected, is_better, suspects_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.output.words.addition import axis_in_words, notes_in_words
-from identify.results.addition import Addition, CorrectedBody, addition
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
+    Addition,
     AxisSummary,
     Comparison,
+    CorrectedBody,
     Diagnosis,
     Feedforward,
     FitResult,
     OnMachine,
     SimulationFit,
+    addition,
     summary_of,
 )
 from identify.selection.curves import having_shape
@@ -56,11 +58,11 @@ from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.logs import GivenLogs, Log, logs_by_name
-from twin.memory import trim_memory
 from twin.model.file import as_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.written import inertial
 from twin.parallel import Progress, parallel, silent, within
+from twin.threads import trim_memory
 
 Logs = Mapping[str, Log]
 Model = MachineModel | str | Path

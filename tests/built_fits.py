@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.motion import Motion
+from identify.dataset.motion import Blocks, Motion
 from identify.dataset.noise_floor import NoiseFloor
 from identify.dataset.prepared_log import PreparedLog, total_force
-from identify.dataset.track import Blocks
 from identify.estimation.evidence import Evidence, Gain
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling

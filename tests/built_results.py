@@ -20,8 +20,14 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.links import WrongBody
-from identify.results.addition import Addition
-from identify.results.results import AxisSummary, Comparison, Diagnosis, FitResult, SimulationFit
+from identify.results.results import (
+    Addition,
+    AxisSummary,
+    Comparison,
+    Diagnosis,
+    FitResult,
+    SimulationFit,
+)
 from identify.selection.acceptance import Score, Taken
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Motion, motion_of
+from identify.dataset.motion import Blocks, Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.track import Blocks
 from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended
 from twin.effect import Excitation

@@ -13,8 +13,7 @@ from identify import workflow
 from identify.output.report import SECTIONS, facts, sections, write_report
 from identify.output.report.page import page
 from identify.output.report.subject import Subject
-from identify.results.addition import Addition
-from identify.results.results import Diagnosis, summary_of
+from identify.results.results import Addition, Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate

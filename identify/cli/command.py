@@ -34,7 +34,7 @@ from twin.parallel import Progress, silent
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from identify.output.answers.answer import Answer
+    from identify.output.answers import Answer
 
 FOLDER = "folder"
 OUTPUTS = (

@@ -40,8 +40,15 @@ from twin.errors import InputError
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.plan import Source
-    from identify.results.addition import Addition, CorrectedBody
-    from identify.results.results import Comparison, Diagnosis, FitResult, OnMachine, SimulationFit
+    from identify.results.results import (
+        Addition,
+        Comparison,
+        CorrectedBody,
+        Diagnosis,
+        FitResult,
+        OnMachine,
+        SimulationFit,
+    )
     from twin.effects import Catalogue
     from twin.model.machine import MachineModel
 
@@ -337,7 +344,7 @@ def frf(
     Example: twin frf multisine.mcap fitted.toml --plot bode.png
     """
     from identify import workflow
-    from identify.output.pictures import require_picture, save_picture
+    from identify.output import require_picture, save_picture
     from identify.results.frequency import FORMATS
 
     if out and out.suffix not in FORMATS:

@@ -190,7 +190,7 @@ def with_logs(
     Also the findings on the first logs, and which of any role were left out, and why. refused:
     names of the faults with which one of the first is refused.
     """
-    from twin.memory import share_one_arena
+    from twin.threads import share_one_arena
 
     share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]

@@ -13,8 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.motion import SMOOTHED, Motion
-from identify.dataset.track import Blocks
+from identify.dataset.motion import SMOOTHED, Blocks, Motion
 from twin.core.walks import walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, axis_table

@@ -30,9 +30,9 @@ from identify.dataset.readings import noise_of_most, ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
 from twin.logs import Log
-from twin.memory import trim_memory
 from twin.model.machine import MachineModel
 from twin.parallel import spread
+from twin.threads import trim_memory
 
 LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 

@@ -23,10 +23,10 @@ from identify.estimation.spatial_periods import spatial_periods
 from identify.rules import RULE
 from twin.curve import Part
 from twin.effect import Kind
-from twin.memory import trim_beside
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
+from twin.threads import trim_beside
 
 MOST_EVALUATIONS = 40
 LINES = 6  # of a spectrum that are looked at, the surest first

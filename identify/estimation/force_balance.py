@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
-from identify.dataset.motion import Motion
+from identify.dataset.motion import Blocks, Motion
 from identify.dataset.prepared_log import (
     PreparedLog,
     moving,
@@ -23,18 +23,17 @@ from identify.dataset.prepared_log import (
     total_force,
     total_forces,
 )
-from identify.dataset.track import Blocks
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.walks import averaged_columns, reading_columns
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
-from twin.memory import trim_beside
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
 from twin.model.units import Scale, has_size
 from twin.parallel import spread
 from twin.signals import Array, between
+from twin.threads import trim_beside
 
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]

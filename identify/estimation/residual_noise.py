@@ -31,9 +31,9 @@ from identify.estimation.fit import LINES, Fit, Outcome, error_on, finished
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
-from twin.memory import trim_memory
 from twin.model.machine import AxisModel
 from twin.signals import Array
+from twin.threads import trim_memory
 
 HATS = 16  # knots of a curve over a coordinate; finer ones would learn the noise
 MOVED = ("velocity", "acceleration", "direction")

@@ -12,9 +12,8 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, reading_error
-from identify.dataset.motion import Motion
+from identify.dataset.motion import Blocks, Motion
 from identify.dataset.prepared_log import PreparedLog, total_force
-from identify.dataset.track import Blocks
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual

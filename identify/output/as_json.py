@@ -10,8 +10,7 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
-from identify.output.answers import diagnoses, fits, frequency, machine
-from identify.output.answers.answer import SCHEMA, Answer, answer_of
+from identify.output.answers import SCHEMA, Answer, answer_of, diagnoses, fits, frequency, machine
 from twin.files import write_atomically
 from twin.schemas import FOLDER
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.frequency.plant import Banded, Plant
+from identify.output import INKS
 from identify.output.numbers import listed, number, percent, pretty, with_band
-from identify.output.pictures import INKS
 from identify.results import figure_of, text_of
 from identify.results.frequency import FrequencyResponse
 from twin.model.units import AxisUnits

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identify.output.pictures import require_picture, save_picture
+from identify.output import require_picture, save_picture
 from twin.effect import Effect
 from twin.model.units import ROTARY
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from identify.output import INKS
 from identify.output.numbers import Scale, capitalised
-from identify.output.pictures import INKS
 from identify.output.report import SECTIONS, sections
 from identify.output.report.effects import fit_table
 from identify.output.report.explorer import coordinate_of_answer, named_signals

@@ -47,10 +47,11 @@ from identify.output.words.plan import (
 )
 from identify.output.words.residual import LOOPS, correlation_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
-from identify.results.addition import Addition, CorrectedBody
 from identify.results.results import (
+    Addition,
     AxisSummary,
     Comparison,
+    CorrectedBody,
     Diagnosis,
     Feedforward,
     FitResult,

@@ -24,7 +24,7 @@ from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
 from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
 from identify.selection.curves import Shape, columns_of, shapes_of, sticking
-from identify.selection.free_exponent import held_exponents
+from identify.selection.found_shape import held_exponents
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted

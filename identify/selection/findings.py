@@ -23,12 +23,11 @@ from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
-from identify.selection.found_shape import FoundShape, found_shape
-from identify.selection.free_exponent import FreeExponent, exponent_curve
+from identify.selection.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.search import Found, Step
 from identify.selection.trying import parameters
-from twin.memory import trim_memory
 from twin.model.machine import AxisModel
+from twin.threads import trim_memory
 
 
 @dataclass(frozen=True)

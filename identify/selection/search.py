@@ -42,8 +42,8 @@ from identify.selection.trying import (
 )
 from twin.effect import Kind
 from twin.effects import Catalogue
-from twin.memory import trim_memory
 from twin.parallel import Progress, silent, within
+from twin.threads import trim_memory
 
 
 @dataclass(frozen=True, eq=False)

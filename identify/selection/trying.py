@@ -34,9 +34,9 @@ from identify.selection.curves import shapes_of
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.memory import trim_memory
 from twin.model.machine import AxisModel
 from twin.parallel import Progress, silent, spread
+from twin.threads import trim_memory
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from identify.cli.command import progress_on_stderr
-from identify.output.answers.answer import plain
+from identify.output.answers import plain
 from studies.thesis.reproduction import reproduce
 from twin.errors import InputError
 from twin.files import make_folder, write_atomically

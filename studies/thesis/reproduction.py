@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.output.answers.answer import plain
+from identify.output.answers import plain
 from identify.output.numbers import capitalised
 from identify.output.report.page import Answer, Section, Tone, page
 from studies.drawing import drawing_style

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from identify.output.answers.answer import plain
+from identify.output.answers import plain
 from studies.drawing import BLUE, drawing_style
 from studies.telling import Line, Panel, picture, tables
 

@@ -11,7 +11,7 @@ THREADS = 4
 # Heaps of the C library while threads that have taken and freed memory are still there.
 HEAPS = f"""
 import ctypes, sys, threading
-from twin.memory import share_one_arena
+from twin.threads import share_one_arena
 
 if sys.argv[1] == "shared":
     share_one_arena()

@@ -10,7 +10,7 @@ from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
 from identify.links import INERTIAL, WrongBody
-from identify.output.answers.answer import LOWER, Answer, Entry, File, Number, Told, answer_of, read
+from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
@@ -26,8 +26,7 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
-from identify.results.addition import Addition, CorrectedBody
-from identify.results.results import Diagnosis
+from identify.results.results import Addition, CorrectedBody, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import FindingKind

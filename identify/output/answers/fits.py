@@ -8,7 +8,7 @@ from pydantic import Field
 
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
-from identify.output.answers.answer import LOWER, Answer, Entry, Number, answer_of, read
+from identify.output.answers import LOWER, Answer, Entry, Number, answer_of, read
 from identify.output.words.fit import (
     MOTION_OUTCOMES,
     OUTCOMES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from identify.frequency.of_logs import AxisFrequency, Shown
-from identify.output.answers.answer import Answer, Entry, Number, answer_of
+from identify.output.answers import Answer, Entry, Number, answer_of
 from identify.results.frequency import FrequencyResponse
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from identify.output.answers.answer import LOWER, Answer, Entry, File, Number, Told, read
+from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, read
 
 if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
     from twin.checks.long import AxisInfo, LogInfo

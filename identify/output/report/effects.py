@@ -39,7 +39,7 @@ from identify.output.words.fit import (
     no_interval_in_words,
     nonparametric_in_words,
 )
-from identify.results.addition import Addition
+from identify.results.results import Addition
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.found_shape import FoundShape

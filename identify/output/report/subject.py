@@ -9,8 +9,7 @@ from functools import cached_property
 from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, all_found, said_of
 from identify.output.words.plan import UNKNOWN, Source, names_of
-from identify.results.addition import Addition
-from identify.results.results import UNTOLD, AxisSummary, Comparison, Diagnosis, OnMachine
+from identify.results.results import UNTOLD, Addition, AxisSummary, Comparison, Diagnosis, OnMachine
 from identify.results.signals import Signals, signals_of
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

@@ -9,8 +9,7 @@ from identify.links import INERTIAL, LINK_MASS, WrongBody
 from identify.output.numbers import arrow, listed, percent, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.output.words.plan import UNKNOWN, Source, names_of
-from identify.results.addition import Addition, CorrectedBody
-from identify.results.results import Diagnosis
+from identify.results.results import Addition, CorrectedBody, Diagnosis
 from twin.model.machine import HistoryStep, MachineModel
 from twin.mujoco.written import inertial
 

@@ -39,8 +39,7 @@ from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
-from identify.selection.found_shape import FoundShape
-from identify.selection.free_exponent import FreeExponent
+from identify.selection.found_shape import FoundShape, FreeExponent
 from twin.effects import load_catalogue
 from twin.model.units import units_of
 

@@ -10,7 +10,7 @@ from arms import ARM, arm_log
 
 from identify.analysis.first_model import first_model
 from identify.dataset.bodies import PIECE, bodies_along
-from identify.dataset.track import Columns
+from identify.dataset.motion import Columns
 from identify.workflow import fit
 from twin.effects import load_catalogue
 from twin.mujoco.mechanism import mechanism_of

@@ -9,8 +9,8 @@ from constructed import SHORT, ridden
 from scipy.signal import lfilter
 
 from identify.dataset.coordinates import lines, ripples
+from identify.dataset.motion import Blocks
 from identify.dataset.spectrum import MOST_LINES, Record, find_lines, lines_in_time
-from identify.dataset.track import Blocks
 
 N = 6000
 

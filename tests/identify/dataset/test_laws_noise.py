@@ -13,14 +13,13 @@ from noisy_motion import MASS, PLACE, PUSH, RATE, noisy
 from scipy.signal import welch
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import motion_of
+from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.noise import noise_of, noises_of
 from identify.dataset.noise_floor import floor_of, noise_beside, noise_floor
 from identify.dataset.prepared_log import on_blocks, total_force
 from identify.dataset.spectrum import median_spectrum
 from identify.dataset.test_function import TestFunction
 from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
-from identify.dataset.track import Blocks
 from identify.estimation.force_balance import residual
 from twin.checks import moves
 from twin.effect import LEAST

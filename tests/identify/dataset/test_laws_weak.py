@@ -20,9 +20,8 @@ from constructed import (
 
 from identify.dataset.coordinates import excitation
 from identify.dataset.drive import actual_force, forces_lessened, reading_error, true_motion
-from identify.dataset.motion import SMOOTHED, Motion, motion_of
+from identify.dataset.motion import SMOOTHED, Blocks, Motion, motion_of
 from identify.dataset.test_function import TestFunction
-from identify.dataset.track import Blocks
 from identify.estimation.force_balance import averaged_force
 from twin.errors import InputError
 from twin.model.machine import AxisModel

@@ -12,7 +12,7 @@ from constructed import log_of, waves
 from machines import one_axis
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import motion_of
+from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.noise import noise_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
@@ -23,7 +23,6 @@ from identify.dataset.readings import (
     ripples_of_widest,
     together,
 )
-from identify.dataset.track import Blocks
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue, load_catalogue

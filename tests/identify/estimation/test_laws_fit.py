@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from constructed import effect, fit_of, held, log_of, moved, waves, windowed
 
-from identify.dataset.motion import motion_of
+from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.prepared_log import moving
-from identify.dataset.track import Blocks
 from identify.estimation.fit import Fit, Outcome, at_bounds, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise

@@ -22,10 +22,9 @@ from constructed import (
     windowed,
 )
 
-from identify.dataset.motion import motion_of
+from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, scale_of, sticks
 from identify.dataset.test_function import TestFunction
-from identify.dataset.track import Blocks
 from identify.estimation.force_balance import (
     averaged_force,
     difference_step,

@@ -19,8 +19,8 @@ from built_fits import (
 )
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.motion import Blocks
 from identify.dataset.prepared_log import PreparedLog
-from identify.dataset.track import Blocks
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.variable_projection import (

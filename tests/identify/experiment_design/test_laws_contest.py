@@ -10,8 +10,8 @@ import pytest
 from built_fits import HARDWARE, PLAIN, axis_of, built_motion, fitted
 from constructed import SHORT, moved, windowed
 
+from identify.dataset.motion import Blocks
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving
-from identify.dataset.track import Blocks
 from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian, residual

@@ -20,7 +20,7 @@ from identify.output.numbers import Scale, capitalised, number, quantity, span, 
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.output.words.fit import aliasing_in_words, moved_in_words
 from identify.output.words.plan import gap_in_words
-from identify.results.addition import Addition
+from identify.results.results import Addition
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests

@@ -25,8 +25,7 @@ from identify.output.machine import check_text, effect_text, effects_text, laws_
 from identify.output.text import text_of
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
-from identify.selection.found_shape import Drawn, FoundShape
-from identify.selection.free_exponent import FreeExponent
+from identify.selection.found_shape import Drawn, FoundShape, FreeExponent
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate

@@ -15,8 +15,7 @@ from unexplained_effects import foreign
 from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import fit_axis
 from identify.estimation.variable_projection import absent_effects
-from identify.results.addition import Addition
-from identify.results.results import FitResult
+from identify.results.results import Addition, FitResult
 from identify.selection.nonparametric import fit_nonparametric
 from identify.workflow import add, fit
 from twin.effect import Effect

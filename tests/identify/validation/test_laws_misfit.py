@@ -11,9 +11,9 @@ from machines import one_axis
 from noisy_motion import MASS, PUSH, RATE, noisy
 
 from identify.dataset.coordinates import coordinates_of, gathered, since_reversal
+from identify.dataset.motion import Blocks
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
-from identify.dataset.track import Blocks
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual

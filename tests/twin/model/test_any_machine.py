@@ -27,11 +27,10 @@ from identify.dataset.coordinates import coordinates_of
 from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
 from identify.output import as_json, text
-from identify.output.answers.answer import plain
+from identify.output.answers import plain
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.addition import Addition
-from identify.results.results import Diagnosis, FitResult
+from identify.results.results import Addition, Diagnosis, FitResult
 from twin.checks import check_log
 from twin.effects import Catalogue
 from twin.errors import InputError
