@@ -6,13 +6,16 @@ Such a file defines ``EXPORTER`` and takes its name, which is that of ``--to``, 
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 from twin.entries import near
 from twin.errors import InputError
@@ -117,6 +120,30 @@ def identifier(name: str) -> str:
     """A name as one of a program: small letters, digits and _."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "model"
     return plain if plain[0].isalpha() else f"m_{plain}"
+
+
+def filled(template: str, **values: Any) -> str:
+    """The text of a template, which is called so, with these values in it."""
+    text: str = _templates().get_template(f"{template}.j2").render(values)
+    return text
+
+
+@cache
+def _templates() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    found = Environment(
+        loader=PackageLoader("twin.export"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    found.filters.update(
+        exact=repr,
+        identifier=identifier,
+        plain=lambda text: text.replace("*/", "* /").replace("\\", "/"),  # it ends no comment
+        quoted=quoteattr,
+    )
+    found.tests.update(finite=math.isfinite)
+    return found
 
 
 @dataclass(frozen=True)

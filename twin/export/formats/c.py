@@ -9,14 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
-from xml.sax.saxutils import quoteattr
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from twin.core.native import LONGEST_STEP
 from twin.effect import IO_SIZE, Effect, Kind
 from twin.errors import InputError
-from twin.export import Exported, Exporter, Remark, axis_identifiers, identifier
+from twin.export import Exported, Exporter, Remark, axis_identifiers, filled, identifier
 from twin.export.c_law import SLOTS, CannotTranslate, CLaws
 from twin.feedforward import followed
 from twin.logs import Log
@@ -24,15 +21,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 MOTION = ("position", "velocity", "acceleration")
 IMPOSED = "1e300"  # kg: along an imposed motion friction slides wherever it moves
-TEMPLATES = Environment(
-    loader=PackageLoader("twin.export"), undefined=StrictUndefined, trim_blocks=True,
-    lstrip_blocks=True, keep_trailing_newline=True,
-)  # fmt: skip
-TEMPLATES.filters.update(
-    identifier=identifier,
-    plain=lambda text: text.replace("*/", "* /").replace("\\", "/"),  # it cannot end a comment
-    quoted=quoteattr,
-)
 
 
 @dataclass(frozen=True)
@@ -170,9 +158,9 @@ def c_source(model: MachineModel) -> CSource:
             )
         )  # fmt: skip
     header, source = (
-        TEMPLATES.get_template(f"model.{kind}.j2").render(
-            model=model, name=name, axes=axes, approximated=approximated, lost=lost,
-            laws=laws.text, slots=SLOTS, io_size=IO_SIZE, imposed=IMPOSED,
+        filled(
+            f"model.{kind}", model=model, name=name, axes=axes, approximated=approximated,
+            lost=lost, laws=laws.text, slots=SLOTS, io_size=IO_SIZE, imposed=IMPOSED,
         )
         for kind in ("h", "c")
     )  # fmt: skip

@@ -16,8 +16,8 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from twin.export import Exported, Exporter, Remark, identifier
-from twin.export.formats.c import TEMPLATES, AxisCode, c_source
+from twin.export import Exported, Exporter, Remark, filled, identifier
+from twin.export.formats.c import AxisCode, c_source
 from twin.logs import Log
 from twin.logs.writer import software_version
 from twin.model.machine import MachineModel
@@ -36,8 +36,8 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     inputs = [signal for a in made.axes for signal in _inputs(a)]
     outputs = [signal for a in made.axes for signal in _outputs(a)]
     header, description = (
-        TEMPLATES.get_template(f"{name}.j2").render(
-            model=model, made=made, guid=guid, inputs=inputs, outputs=outputs,
+        filled(
+            name, model=model, made=made, guid=guid, inputs=inputs, outputs=outputs,
             units=dict.fromkeys(unit for _, unit, _ in [*inputs, *outputs]),
             version=software_version(),
         )

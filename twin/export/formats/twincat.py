@@ -12,7 +12,7 @@ from math import degrees
 
 import numpy as np
 
-from twin.export import Exported, Exporter, Remark, axis_identifiers
+from twin.export import Exported, Exporter, Remark, axis_identifiers, filled
 from twin.export.formats.csv import csv_text
 from twin.export.tables import ENTRIES, AxisTables, Judged, exported, fewest_points, judged_axes
 from twin.logs import Log
@@ -49,24 +49,13 @@ def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
     current = f"mA, {units.words('force')} over {constant:g} {units('N/A')}"
     force = f"0.001 {units.force}: the model has no force constant"
     speeds = np.degrees(of.speeds) * 1e3 if axis.rotary else of.speeds * 1e6
-    lines = [
-        f"# Friction compensation of axis {name}: {_points(axis, of)}",
-        f"# .in in {'0.001 degrees/s' if axis.rotary else 'um/s'}, .out in "
-        f"{current if known else force}",
-        "# .out has to be in the unit of dig_drv.act_torque of the drive: adapt scaling_factor",
-        f"# {units.mass_name} for the acceleration feedforward: {of.mass:.6g} {units.mass}",
-        *(f"# nearly: {r.part}, {r.text}" for r in found.approximated),
-        *(f"# lost: {r.part}, {r.text}" for r in found.lost),
-    ]
-    mode = 3  # P-COMP-00041: current by commanded speed, the only mode
-    entries: dict[str, float] = {
-        "mode": mode, "table_entries": len(speeds), "position_delay": 0, "reversal_lookahead": 0,
-        "scaling_factor": 1000, "delay_cycles": 0,  # P-COMP-00045: 100.0 %
-    }  # fmt: skip
-    for i, (speed, needed) in enumerate(zip(speeds, 1e3 * of.forwards / constant, strict=True)):
-        entries |= {f"table[{i}].in": round(float(speed)), f"table[{i}].out": round(needed, 3)}
-    lines += [f"frict_comp.{key:24s}{value}" for key, value in entries.items()]
-    files = {f"{name}_friction.lis": "\n".join(lines) + "\n"}
+    needed = 1e3 * of.forwards / constant
+    entries = [(round(float(v)), round(f, 3)) for v, f in zip(speeds, needed, strict=True)]
+    listed = filled(
+        "friction.lis", name=name, axis=axis, found=found, points=_points(axis, of), mass=of.mass,
+        unit=current if known else force, entries=entries,
+    )  # fmt: skip
+    files = {f"{name}_friction.lis": listed}
     for p in of.periodic:
         phase = np.arange(ENTRIES) * 360.0 / ENTRIES
         unit = f"force ({units.force})" if not known else "current (A)"
