@@ -19,7 +19,7 @@ from twin.errors import InputError, at
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
 from twin.experiments.trajectory import AnySetpoint, Setpoint
-from twin.export import axis_identifiers
+from twin.export import axis_identifiers, filled
 from twin.files import atomic_writer, write_atomically
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, AxisUnits
@@ -165,52 +165,33 @@ def write_setpoints(experiment: Experiment, model: MachineModel, seed: int, path
 
 def _trajectory(setpoint: Setpoint, model: MachineModel) -> str:
     """The message as YAML, a point a line."""
-    lines = []
     # s, between the points of a trajectory, which a controller joins by smooth curves
-    points = 0.01
-    for k in _points(setpoint, points):
-        named = zip(("positions", "velocities", "accelerations"), setpoint.columns, strict=False)
-        values = (f"{name}: [{', '.join(f'{v:.9f}' for v in x[k])}]" for name, x in named)
-        seconds, rest = divmod(round(1e9 * k / setpoint.sample_rate), 10**9)
-        lines.append(
-            f"- {{time_from_start: {{sec: {seconds}, nanosec: {rest}}}, {', '.join(values)}}}\n"
+    points = [
+        (
+            *divmod(round(1e9 * k / setpoint.sample_rate), 10**9),
+            *(x[k] for x in setpoint.columns[:3]),
         )
-    return f"joint_names: [{', '.join(model.axes)}]\npoints:\n{''.join(lines)}"
+        for k in _points(setpoint, 0.01)
+    ]
+    return filled("trajectory.yaml", axes=list(model.axes), points=points)
 
 
 def _structured_text(setpoint: Setpoint, model: MachineModel) -> str:
-    """A list of global variables, and in a comment how a task feeds it (Beckhoff, Tc2_MC2)."""
-    points = _points(setpoint, 1e-3)  # s, of the PLC task that takes a point each cycle
-    cycle, last = (points[1] - points[0]) / setpoint.sample_rate, len(points) - 1
-    names = axis_identifiers(model)
-    feeds = [
-        f"MC_ExtSetPointGenFeed({n}_Position[k], {n}_Velocity[k], {n}_Acceleration[k], "
-        f"{n}_Direction[k], {n});"
-        for n in names.values()
-    ]
-    lines = [
-        f"(* Setpoints for a PLC task of {1e3 * cycle:g} ms.",
-        "After MC_ExtSetPointGenEnable of each axis, in each cycle, with k from 0 to Last:", *feeds,
-        "The units are those in the comments; scale them to those of the axis. *)",
-        "VAR_GLOBAL CONSTANT", f"    Last : DINT := {last};", "END_VAR", "VAR_GLOBAL",
-    ]  # fmt: skip
+    """Arrays as global variables, of a PLC task that takes a point each cycle of 1 ms or more."""
+    points, names, arrays = _points(setpoint, 1e-3), axis_identifiers(model), []
     for i, (axis, name) in enumerate(names.items()):
-        position, velocity, acceleration = (x[points, i] for x in setpoint.columns[:3])
         units = model.axes[axis].units
-        for what, values, unit in (
-            ("Position", position, units.position), ("Velocity", velocity, units.velocity),
-            ("Acceleration", acceleration, units("m/s^2")),
-        ):  # fmt: skip
-            lines += _array(f"{name}_{what}", "LREAL", [f"{v:.9g}" for v in values], unit)
-        lines += _array(f"{name}_Direction", "DINT", [f"{v:.0f}" for v in np.sign(velocity)], "1")
-    return "\n".join([*lines, "END_VAR", ""])
-
-
-def _array(name: str, kind: str, values: list[str], unit: str) -> list[str]:
-    a_line = 8  # values of an array
-    rows = [", ".join(values[k : k + a_line]) for k in range(0, len(values), a_line)]
-    head = f"    {name} : ARRAY[0..{len(values) - 1}] OF {kind} := [ (* {unit} *)"
-    return [head, *(f"        {row}," for row in rows[:-1]), f"        {rows[-1]}];"]
+        position, velocity, acceleration = (x[points, i] for x in setpoint.columns[:3])
+        arrays += [
+            (f"{name}_Position", "LREAL", "%.9g", position, units.position),
+            (f"{name}_Velocity", "LREAL", "%.9g", velocity, units.velocity),
+            (f"{name}_Acceleration", "LREAL", "%.9g", acceleration, units("m/s^2")),
+            (f"{name}_Direction", "DINT", "%.0f", np.sign(velocity), "1"),
+        ]
+    cycle = 1e3 * ((points[1] - points[0]) / setpoint.sample_rate)
+    return filled(
+        "setpoints.st", cycle=cycle, last=len(points) - 1, names=names.values(), arrays=arrays
+    )
 
 
 def _points(setpoint: Setpoint, apart: float) -> list[int]:
