@@ -23,14 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, sticks
+from identify.dataset.prepared_log import Columns, PreparedLog, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Errors, Fit, fit_axis
 from identify.estimation.intervals import half_widths_by
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, least_t, part_of, taken
-from identify.selection.controls import Columns, Trial, unit_penalty
+from identify.selection.controls import Trial, unit_penalty
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import confidence
 from identify.selection.trying import NEARLY_ALL

@@ -20,6 +20,7 @@ from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import Refit, refit
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
+from identify.estimation.free_curves import having_shape
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
@@ -46,7 +47,6 @@ from identify.results.results import (
     addition,
     summary_of,
 )
-from identify.selection.curves import having_shape
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect

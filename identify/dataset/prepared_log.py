@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 
 Reach = tuple[float, float]  # lowest and highest position, m
 EVERYWHERE: Reach = (-np.inf, np.inf)
+
+# Logs -> forces (m, j) N of each, one column for each of j strengths.
+Columns: TypeAlias = Callable[[Sequence["PreparedLog"]], list[Array]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
 """A model on a dataset: force balance, fit, variable projection, evidence, intervals.
 
-Also the properties of logs that need a fit: their channel delay and their time origins.
+Also what a fit tells beside: channel delay and time origins of logs, free curves of its laws.
 """

@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import Columns, PreparedLog, moving, split_by_log, sticks
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, at_bounds, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.found_shape import held_exponents
+from identify.estimation.free_curves import Shape, columns_of, shapes_of, sticking
 from identify.estimation.variable_projection import Start, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
-from identify.selection.controls import Columns, Trial, change_of, with_unit_penalty
-from identify.selection.curves import Shape, columns_of, shapes_of, sticking
-from identify.selection.found_shape import held_exponents
+from identify.selection.controls import Trial, change_of, with_unit_penalty
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted

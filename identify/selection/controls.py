@@ -17,7 +17,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import Columns, PreparedLog, moving, split_by_log, sticks
 from identify.estimation.evidence import blocks_of, by_blocks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian, residual
@@ -28,7 +28,6 @@ from identify.selection.acceptance import Judged, larger, parts
 from twin.parallel import spread
 
 Array = NDArray[np.float64]
-Columns = Callable[[Sequence[PreparedLog]], list[Array]]
 Falsify = Callable[[Array, np.random.Generator], Array]
 
 TINY = np.finfo(float).tiny  # of what is nothing, as a column where the motion excites none

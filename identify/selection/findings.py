@@ -20,10 +20,10 @@ from enum import Enum
 from identify.dataset.dataset import Dataset, Role
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
+from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
-from identify.selection.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.search import Found, Step
 from identify.selection.trying import parameters
 from twin.model.machine import AxisModel

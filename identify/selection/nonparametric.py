@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.free_curves import Shape
 from identify.estimation.splines import Linearised, choose_stiffness
 from identify.estimation.variable_projection import fit_without
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate, candidate_of
 from identify.selection.controls import change_control
-from identify.selection.curves import Shape
 from twin.effect import Effect
 from twin.model.machine import AxisModel, Fitted, MachineModel
 

@@ -13,6 +13,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.drive import is_noise, knows_rounding
 from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.free_curves import shapes_of
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
@@ -30,7 +31,6 @@ from identify.selection.changes import (
     reshaped_of,
 )
 from identify.selection.controls import Trial
-from identify.selection.curves import shapes_of
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Role
+from identify.estimation.found_shape import FoundShape
 from identify.estimation.intervals import Estimate, ModelWrong
 from identify.output.numbers import (
     NOTHING,
@@ -42,7 +43,6 @@ from identify.output.words.fit import (
 from identify.results.results import Addition
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.found_shape import FoundShape
 from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
 from twin.model.machine import AxisModel, HistoryStep

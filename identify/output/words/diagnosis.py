@@ -10,6 +10,7 @@ import numpy as np
 
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
+from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.output.numbers import (
     Scale,
     arrow,
@@ -39,7 +40,6 @@ from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
-from identify.selection.found_shape import FoundShape, FreeExponent
 from twin.effects import load_catalogue
 from twin.model.units import units_of
 

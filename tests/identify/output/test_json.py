@@ -22,13 +22,13 @@ from report_cases import cogging_case
 from strict_json import shipped, strict, told, valid
 
 from identify.estimation.fit import Outcome
+from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
 from identify.output.answers import Answer, plain
 from identify.output.answers.machine import EffectAnswer, check_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
 from identify.results.results import CorrectedBody
 from identify.selection.diagnosis import Verdict
-from identify.selection.found_shape import Drawn, FoundShape, FreeExponent
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate

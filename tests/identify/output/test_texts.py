@@ -19,13 +19,13 @@ from built_fits import CATALOGUE, NOISE, built, built_fit, fitted, step
 from identify.dataset.dataset import Role
 from identify.estimation.confounded import Refit
 from identify.estimation.fit import Outcome
+from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
 from identify.estimation.intervals import refusal
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
-from identify.selection.found_shape import Drawn, FoundShape, FreeExponent
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, Finding, Severity
 from twin.curve import Coordinate

@@ -14,13 +14,13 @@ from planted_logs import HARDWARE, NOISE, RATE, RUBS, SLIDE, Ride, asked, begun,
 from scipy.signal import lfilter
 
 import identify
+from identify.estimation.found_shape import found_shape
+from identify.estimation.free_curves import shapes_of
 from identify.output.as_json import json_of
 from identify.output.words.diagnosis import finding_in_words, verdict_in_words
 from identify.output.words.plan import next_commands
-from identify.selection.curves import shapes_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import FindingKind
-from identify.selection.found_shape import found_shape
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel

@@ -18,11 +18,11 @@ from identify.dataset.prepared_log import moving
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force, steady_force
+from identify.estimation.free_curves import Shape, sticking
 from identify.estimation.intervals import with_band
 from identify.estimation.least_squares import solve
 from identify.estimation.splines import Linearised
 from identify.rules import RULE
-from identify.selection.curves import Shape, sticking
 from twin.curve import Coordinate
 from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import Columns, PreparedLog, moving, split_by_log, sticks
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
 from identify.estimation.splines import STIFFNESS, Linearised, choose_stiffness
 from identify.rules import RULE
-from identify.selection.controls import Columns
 from twin.curve import Curve
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
