@@ -71,17 +71,18 @@ class Start:
 def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """The effect at its best shapes beside the base, best first; at least one.
 
-    All shapes are tried on the logs' heads, of many those that ``_scanned`` picks, and the best of
-    them on all of the logs; the others only if the first gains more there than chance. So are the
-    shapes that make no force on the heads, such as a stop that only a later move reaches. A
-    friction's shapes are told apart by the heads.
+    Few shapes are tried on all of the logs. More are tried on their heads, of many those that
+    ``_scanned`` picks, and the best of them on all of the logs; the others only if the first gains
+    more there than chance. So are the shapes that make no force on the heads, such as a stop that
+    only a later move reaches. A friction's shapes are told apart by the heads.
     """
     excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
     shapes = _seen_to_repeat(effect, list(tried_shapes(effect, excitation)), base.logs)
     found = [Start(shape, absent, nothing, nothing) for shape in shapes]
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
-    if len(found) <= FINALISTS:
+    # 12 shapes are few enough to be tried where the effect may be rare, as breakaways after rests
+    if len(found) <= (FINALISTS if effect.kind is Kind.FRICTION else 12):
         return _best(whole, found)[:REFINED_STARTS]
     found = _scanned(_Ground.of(base, dataset, effect, excitation, on_heads=True), found)
     if effect.kind is Kind.FRICTION:

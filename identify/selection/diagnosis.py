@@ -14,12 +14,14 @@ from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Look
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
-from identify.selection.search import Found, Step, adds_friction, is_level, search
+from identify.selection.search import Found, Step, is_level, search
 from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.model.machine import Fitted
 from twin.parallel import Progress, silent
+
+ALIKE = (Kind.FRICTION, Kind.STRUCTURE)  # whose values of one name mean the same in each
 
 
 class Verdict(Enum):
@@ -177,9 +179,9 @@ def _with_ties(found: Found) -> Found:
     """What a search found, with ties decided beside all that was found.
 
     When an early change was compared with its rivals, the later ones were still missing. Of a
-    friction all others are rivals, whatever their own fits ended in.
+    friction or a resonance all others are rivals, whatever their own fits ended in.
     """
-    if len(found.steps) < 2 and not any(adds_friction(s.change) for s in found.steps):
+    if len(found.steps) < 2 and not any(_others_alike(s, found) for s in found.steps):
         return found
     return replace(found, steps=tuple(_compared_again(s, found) for s in found.steps))
 
@@ -198,25 +200,28 @@ def _compared_again(step: Step, found: Found) -> Step:
             return True
         law = rival.judged.fit.axis[rival.change.name]
         laws = [law] if rival.candidate.score else []
-        if law.effect.kind is Kind.FRICTION:  # whose values were those of another model
+        if law.effect.kind in ALIKE:  # whose values were those of another model
             laws.append(_as_free_as(final.fit.axis[step.change.name], law))
         fits = (fit_axis(axis.with_effect(each), found.dataset.fit) for each in laws)
         fit = min(fits, key=lambda f: f.error)
         return is_level(replace(rival, judged=Judged(fit, found.dataset)), own)
 
-    rivals = {t.change.name: t for t in (*_other_frictions(step, found), *step.level)}
+    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.level)}
     return replace(step, level=tuple(t for t in rivals.values() if beside(t)))
 
 
-def _other_frictions(step: Step, found: Found) -> list[Tried]:
-    """All others of the catalogue, where a friction was added."""
-    if not adds_friction(step.change):
+def _others_alike(step: Step, found: Found) -> list[Tried]:
+    """All others of the catalogue, where a friction or a resonance was added."""
+    kind = step.change.effect.kind
+    if not isinstance(step.change, Added) or kind not in ALIKE:
         return []
-    others = [c for c in found.ranking if c.effect.kind is Kind.FRICTION and not c.doubt]
-    changes = [Added(c.effect) for c in others]
+    own = {p.name for p in step.change.effect.parameters if not p.strength}
+    others = (c for c in found.ranking if c.effect.kind is kind and not c.doubt)
+    rivals = [c for c in others if own & {p.name for p in c.effect.parameters}]
+    changes = [Added(c.effect) for c in rivals]
     return [
         Tried(change, Look(change, 0.0), Judged(c.fit, found.dataset), c)
-        for change, c in zip(changes, others, strict=True)
+        for change, c in zip(changes, rivals, strict=True)
     ]
 
 

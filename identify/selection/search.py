@@ -285,11 +285,6 @@ def _best_of(tried: Sequence[Tried]) -> Tried:
     return best
 
 
-def adds_friction(change: Change) -> bool:
-    """Whether it is another friction, in the place of one or where there is none."""
-    return isinstance(change, Added) and _rubs(change)
-
-
 def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
     """The laws that take about as much as a free curve, whose ten numbers are any law's.
 
