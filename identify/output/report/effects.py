@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Role
@@ -43,6 +43,7 @@ from identify.output.words.fit import (
 from identify.results.results import Addition
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import Finding
 from identify.selection.nonparametric import nonparametric_labels
 from twin.effect import Effect
 from twin.model.machine import AxisModel, HistoryStep
@@ -60,25 +61,15 @@ def found(view: AxisView) -> list[Block]:
         return []
     findings, tested, unit = view.found.findings, view.found.tested, view.units.force
     scale = Scale.of(unit, [tested.before, *(f.tested.before for f in findings)])
-    rows = [
-        Row((
-            title_case(f.effect),
-            scale.text(f.tested.before),
-            scale.text(f.tested.after),
-            percent(f.explains),
-            percent(max(f.score.part, 0.0)),
-            percent(max(f.score.control, 0.0)),
-            NOTHING if f.confidence is None else percent(f.confidence),
-        ), bar=min(max(f.explains, 0.0), 1.0))
-        for f in findings
-    ]  # fmt: skip
-    if len(findings) > 1:
-        every = (scale.text(tested.before), scale.text(tested.after))
-        rows.append(Row(("All together", *every, percent(view.found.explained), *[NOTHING] * 3)))
-    titles = (
-        "Effect", "Error without it", "Error with all", "Share of squared error",
-        "Of what the others leave", "Shifted in time, at most", "Such answers right",
-    )  # fmt: skip
+    columns: dict[str, Callable[[Finding], str]] = {
+        "Effect": lambda f: title_case(f.effect),
+        "Error without it": lambda f: scale.text(f.tested.before),
+        "Error with all": lambda f: scale.text(f.tested.after),
+        "Share of squared error": lambda f: percent(f.explains),
+        "Of what the others leave": lambda f: percent(max(f.score.part, 0.0)),
+        "Shifted in time, at most": lambda f: percent(max(f.score.control, 0.0)),
+        "Such answers right": lambda f: NOTHING if f.confidence is None else percent(f.confidence),
+    }
     caption = (
         f"RMS force error on the {tested.on.value} logs. Each effect is taken out alone and the "
         "others refitted, which can stand in for it: the shares need not add up. Of what the "
@@ -86,7 +77,14 @@ def found(view: AxisView) -> list[Block]:
         "same force shifted in time, which cannot be real, at most the next. Right: of answers as "
         "well supported, on machines whose missing effect is known."
     )
-    return [Table(titles, rows, view.words(caption))]
+    table = Table.of(
+        findings, columns, view.words(caption), bar=lambda f: min(max(f.explains, 0.0), 1.0)
+    )
+    if len(findings) == 1:
+        return [table]
+    every = (scale.text(tested.before), scale.text(tested.after))
+    together = Row(("All together", *every, percent(view.found.explained), *[NOTHING] * 3))
+    return [replace(table, rows=[*table.rows, together])]
 
 
 # --- the shape of a law, and curves without physics ------------------------------------------
@@ -147,30 +145,28 @@ def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
     scale = Scale.of(units.force, [c.gain.before for c in refitted])
-    rows = []
-    for rank, c in enumerate(refitted):
-        tone, part = Tone.PLAIN if c.supported else Tone.MUTED, max(c.part, 0.0)
-        with_values = 3  # candidates whose parameter values are printed
-        cells = (
-            title_case(c.effect.name),
-            number(c.delta_bic),
-            scale.text(c.gain.before),
-            scale.text(c.gain.after),
-            percent(part),
-            spaced(why_not(found, c)),
-            values_of(c.effect, c.fit.axis) if rank < with_values else "",
-        )
-        rows.append(Row(cells, Tone.STRONG if c is found.best else tone, min(part, 1.0)))
-    titles = (
-        "Effect", "Evidence (ΔBIC)", "Error before", "Error after", "Part removed", "Why not",
-        "Values",
-    )  # fmt: skip
+    told = [c.effect.name for c in refitted[:3]]  # with their values
+    columns: dict[str, Callable[[Candidate], str]] = {
+        "Effect": lambda c: title_case(c.effect.name),
+        "Evidence (ΔBIC)": lambda c: number(c.delta_bic),
+        "Error before": lambda c: scale.text(c.gain.before),
+        "Error after": lambda c: scale.text(c.gain.after),
+        "Part removed": lambda c: percent(max(c.part, 0.0)),
+        "Why not": lambda c: spaced(why_not(found, c)),
+        "Values": lambda c: values_of(c.effect, c.fit.axis) if c.effect.name in told else "",
+    }
     caption = (
         f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
         f"BIC. Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the "
         "noise floor, on the training logs or on data left out of the fit, whichever is less."
     )
-    return Table(titles, rows, units.words(caption))
+
+    def tone(c: Candidate) -> Tone:
+        return Tone.STRONG if c is found.best else Tone.PLAIN if c.supported else Tone.MUTED
+
+    return Table.of(
+        refitted, columns, units.words(caption), tone, lambda c: min(max(c.part, 0.0), 1.0)
+    )
 
 
 def values_of(effect: Effect, model: AxisModel) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib.metadata
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from identify.output.report.subject import AxisView, Subject
 
 NUMBER = re.compile(rf"(-?([\d.]+(e[+-]\d+)?|∞)( \S+)?|{NOTHING})?")  # a cell, with its unit
+T = TypeVar("T")
 
 TEMPLATES = Environment(
     loader=PackageLoader("identify.output.report", "."), autoescape=True,
@@ -128,6 +129,15 @@ class Table(Block):
     titles: Sequence[str]
     rows: Sequence[Row]
     caption: str = ""
+
+    @classmethod
+    def of(
+        cls, items: Iterable[T], columns: Mapping[str, Callable[[T], str]], caption: str = "",
+        tone: Callable[[T], Tone] = lambda _: Tone.PLAIN, bar: Callable[[T], float] = lambda _: 0.0,
+    ) -> Table:  # fmt: skip
+        """A row an item; columns: by title, what they show of it."""
+        rows = [Row([show(i) for show in columns.values()], tone(i), bar(i)) for i in items]
+        return cls(tuple(columns), rows, caption)
 
     @property
     def numeric(self) -> list[bool]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from identify.output.words.residual import (
 from identify.rules import RULE
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON
-from identify.validation.misfit_maps import MisfitMap
+from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.whiteness import Correlation, ResidualTests
 from twin.model.units import AxisUnits, units_of
 
@@ -46,26 +46,19 @@ def of_model(view: AxisView) -> str:
 
 def regions_table(axis: AxisComparison, model: str) -> Table:
     """The regions whose share of the error most exceeds their share of time, in that order."""
-    rows = [
-        Row((
-            capitalised(place_in_words(region)).removesuffix("."),
-            quantity(region.rms, region.force_unit),
-            number(region.ratio),
-            percent(region.share),
-            percent(region.visited),
-            percent(region.share - region.visited),
-        ), bar=region.share)
-        for region in axis.worst
-    ]  # fmt: skip
-    titles = (
-        "Where", "RMS error", "Times noise floor", "Share of squared error", "Share of time",
-        "Difference",
-    )  # fmt: skip
+    columns: dict[str, Callable[[Region], str]] = {
+        "Where": lambda r: capitalised(place_in_words(r)).removesuffix("."),
+        "RMS error": lambda r: quantity(r.rms, r.force_unit),
+        "Times noise floor": lambda r: number(r.ratio),
+        "Share of squared error": lambda r: percent(r.share),
+        "Share of time": lambda r: percent(r.visited),
+        "Difference": lambda r: percent(r.share - r.visited),
+    }
     caption = (
         f"{model}The worst region of each coordinate, in the order of the difference of the two "
         "shares. Of a frequency band the share of time is that of the squared force."
     )
-    return Table(titles, rows, axis.units.words(caption))
+    return Table.of(axis.worst, columns, axis.units.words(caption), bar=lambda r: r.share)
 
 
 def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: str) -> Table:
@@ -161,25 +154,20 @@ def logs(view: AxisView) -> list[Block]:
     force = Scale.of(view.units.force, list(axis.force_error.values()))
     position = Scale.of(view.units.position, list(axis.position_error.values()))
     durations = {log.motion.name: len(log.motion.time) * log.motion.period for log in axis.logs}
-    rows = [
-        Row((
-            name,
-            quantity(durations[name], "s"),
-            force.text(error),
-            number(error / axis.floor),
-            position.text(axis.position_error.get(name)),
-            position.text(axis.position_floor.get(name)),
-        ))
-        for name, error in axis.force_error.items()
-    ]  # fmt: skip
-    titles = (
-        "Log", "Duration", words("Force error, RMS"), "Times noise floor",
-        words("Position error, free run, RMS"), "Expected from noise",
-    )  # fmt: skip
+    columns: dict[str, Callable[[str], str]] = {
+        "Log": lambda name: name,
+        "Duration": lambda name: quantity(durations[name], "s"),
+        words("Force error, RMS"): lambda name: force.text(axis.force_error[name]),
+        "Times noise floor": lambda name: number(axis.force_error[name] / axis.floor),
+        words("Position error, free run, RMS"): (
+            lambda name: position.text(axis.position_error.get(name))
+        ),
+        "Expected from noise": lambda name: position.text(axis.position_floor.get(name)),
+    }
     caption = (
         f"{of_model(view)}Noise floor of the force: {quantity(axis.floor, view.units.force)} RMS "
         f"with test functions of {quantity(axis.logs[0].test_function.length, 's')}. The free run "
         f"restarts from the measured motion every {HORIZON:g} s; between restarts the position "
         "drifts with every wrong force, measurement noise included."
     )
-    return [Table(titles, rows, words(caption))]
+    return [Table.of(axis.force_error, columns, words(caption))]
