@@ -147,9 +147,9 @@ def suspects_of(
     """
     if not model.joints:
         return Suspects()
-    from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
+    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
 
-    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    mechanism = mechanism_in(model)
     before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
     left = [a for a in mechanism.axes if a in before and not before[a].at_floor]
     if not left:

@@ -7,6 +7,7 @@ to ``qfrc_applied``, and a velocity loop follows sums of sines.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -37,6 +38,20 @@ ARM = """<mujoco model="arm">
   </worldbody>
 </mujoco>
 """
+# A belt couples the joints. What its file has of friction and springs is not the machine's.
+SUMS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [0.0, -0.5, 1.0]])
+COUPLED = ARM.replace(
+    "</mujoco>",
+    """  <tendon>
+    <fixed name="lift" frictionloss="3" stiffness="7" armature="2" damping="1">
+      <joint joint="shoulder" coef="1"/><joint joint="elbow" coef="0.5"/>
+    </fixed>
+    <fixed name="belt"><joint joint="shoulder" coef="-0.5"/><joint joint="elbow" coef="1"/></fixed>
+  </tendon>
+  <actuator><motor name="roll" tendon="belt" gear="20"/></actuator>
+</mujoco>""",
+).replace('"elbow" axis', '"elbow" damping="4" frictionloss="5" axis')
+MOTORS = {"base": "base", "lift": "lift", "roll": "belt"}
 SAMPLE, STEPS = 0.002, 4  # s, and steps of MuJoCo within it
 COULOMB, VISCOUS = np.array([0.8, 0.4, 0.1]), np.array([0.3, 0.2, 0.05])
 STEEP = 1e-3  # rad/s, over which the planted Coulomb friction changes its sign
@@ -92,3 +107,12 @@ def arm_of(position: Array, command: Array) -> Log:
         a: {"position": position[:, i], "force": command[:, i]} for i, a in enumerate(JOINTS)
     }
     return Log(1.0 / SAMPLE, {a: AxisLog(columns, ROTARY_UNITS) for a, columns in signals.items()})
+
+
+def coupled_log(seed: int, forces: Forces = friction) -> Log:
+    """The log of the motors of COUPLED; forces: of their positions and velocities."""
+    log = arm_log(seed, lambda q, v: SUMS.T @ forces(SUMS @ q, SUMS @ v))
+    signals = ([log.axes[joint].columns[n] for joint in JOINTS] for n in ("position", "force"))
+    position, torque = (np.transpose(columns) for columns in signals)
+    made = arm_of(position @ SUMS.T, torque @ np.linalg.inv(SUMS))
+    return replace(made, axes=dict(zip(MOTORS, made.axes.values(), strict=True)))

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError
 
+SINGULAR = 1e-9  # of rows of size 1: what ratios of nine digits leave where they depend on others
+
 
 def is_number(value: Any) -> bool:
     """Whether it is a finite number; True is none, nor is an integer beyond every double."""
@@ -24,6 +26,13 @@ def first_not_finite(values: NDArray[Any]) -> int | None:
     """Index of the first of these values (n,) that is not a finite number; None where all are."""
     finite = np.isfinite(values)
     return None if finite.all() else int(np.argmin(finite))
+
+
+def independent(rows: NDArray[np.float64]) -> bool:
+    """Whether none of these rows (k, n) is a sum of the others, each with a factor."""
+    size = np.abs(rows).max(axis=1, keepdims=True)
+    scaled = rows / np.where(size > 0.0, size, 1.0)
+    return int(np.linalg.matrix_rank(scaled, tol=SINGULAR)) == len(rows)
 
 
 def require_seed(seed: int) -> None:

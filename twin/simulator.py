@@ -134,26 +134,23 @@ class MujocoSimulator:
     def __init__(self, model: MachineModel, table: Table) -> None:
         import mujoco
 
-        from twin.mujoco.mechanism import driven, followed_by, jointed_spec
+        from twin.mujoco.mechanism import driven, jointed_spec, mechanism_in
         from twin.mujoco.mjcf import machine_spec
 
-        self._followed = None
+        self._transmission = None
         if model.joints:
-            spec, axes, self._followed = jointed_spec(model), driven(model), followed_by(model)
+            spec, axes = jointed_spec(model), driven(model)
+            self._transmission = mechanism_in(model).transmission
         else:
             spec = machine_spec(model)
             pairs = zip(model.axes, table.masses, strict=True)
             axes = [Driven(a, f"motor_{a}", mass) for a, mass in pairs]
-        self.user_at = attach(spec, table, model.period, axes)
+        self._own = attach(spec, table, model.period, axes)
         # A bad state stays bad, and is found, instead of starting again from zero.
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.model = spec.compile()
         self._machine, self._table = model, table
         self.data = mujoco.MjData(self.model)
-        joints = [(self.model.joint(a.joint), self.model.actuator(a.motor)) for a in axes]
-        self._where = np.array(
-            [(joint.qposadr[0], joint.dofadr[0], motor.id) for joint, motor in joints]
-        )
         self._attached = self._attached_joints()
         self._step = native_address("mj_step")
 
@@ -177,15 +174,15 @@ class MujocoSimulator:
     ) -> None:
         """See Stepper."""
         self.data.time = first * self.model.opt.timestep
-        if (joints := self._followed) is None:
-            self.data.qpos[self._where[:, 0]] = position
-            self.data.qvel[self._where[:, 1]] = velocity
+        if (joints := self._transmission) is None:
+            qpos, dof = self._own.parts[:, :2].astype(int).T
+            self.data.qpos[qpos], self.data.qvel[dof] = position, velocity
         else:
-            self.data.qpos[:] = joints.ratio * position[joints.axis] + joints.offset
-            self.data.qvel[:] = joints.ratio * velocity[joints.axis]
+            self.data.qpos[:] = joints.joints(position)
+            self.data.qvel[:] = joints.by @ velocity
         self.data.qpos[self._attached[:, 0]] = states[self._attached[:, 2]]
         self.data.qvel[self._attached[:, 1]] = states[self._attached[:, 2] + 1]
-        user = self.data.userdata[self.user_at :]
+        user = self.data.userdata[self._own.user_at :]
         user[:USER_HEADER] = self.data.time, origin
         user[USER_HEADER : USER_HEADER + 2 * len(states)] = np.tile(states, 2)
 
@@ -196,7 +193,7 @@ class MujocoSimulator:
         with passive_callback(), collected_warnings(self.data) as warnings:
             run_mujoco(
                 self._step, self.model._address, self.data._address, tuple(offsets()[3:7]),
-                self._where, self.user_at, first, *shared[:-1], setpoints, noise, shared[-1], *out,
+                tuple(self._own), first, *shared[:-1], setpoints, noise, shared[-1], *out,
             )  # fmt: skip
         if warnings:
             require_sound(out[0], out[1], self._machine, self._table, first)
@@ -336,9 +333,9 @@ def _carried(model: MachineModel, setpoint: Setpoint) -> Array | float:
     """
     if not model.joints:
         return 0.0
-    from twin.mujoco.mechanism import mechanism_of
+    from twin.mujoco.mechanism import mechanism_in
 
-    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    mechanism = mechanism_in(model)
     bodies = mechanism.carried(setpoint.position.T, setpoint.acceleration.T).T
     return bodies - mechanism.inertia * setpoint.acceleration
 

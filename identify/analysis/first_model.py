@@ -210,9 +210,10 @@ def first_model(
     And a constant force where the logs ask for it. Static friction is that of Coulomb where the
     axis does not break away from rest (``not_determined``). Hardware is what the logs show: travel,
     speed, acceleration and force that were reached, the step and the noise of the encoder. bodies:
-    name and text of an MJCF or URDF file, whose joints are the axes of the same names; each log
-    then holds all of them. Raises InputError where no axis moves, where the logs differ in sample
-    rate, and where they do not tell the mass, or lack a joint.
+    name and text of an MJCF or URDF file, whose joints or fixed tendons are the axes of their
+    names, or of those of their actuators; each log then holds all of them. Raises InputError where
+    no axis moves, where the logs differ in sample rate, and where they do not tell the mass, or
+    lack a joint.
     """
     require_samples(logs)
     rates = sorted({log.sample_rate for log in logs.values()})
@@ -248,13 +249,14 @@ def first_model(
 
 
 def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
-    """The machine whose axes are the joints of the same names, without effects."""
+    """The machine whose axes are the joints or tendons of those names, without effects."""
     from twin.mujoco.mechanism import joints_of  # MuJoCo takes long to load
+    from twin.mujoco.transmission import proposed
 
-    found = joints_of(text, file, {axis: axis for axis in names})
+    given = proposed(text, file, names)
     axes = {
-        axis: AxisModel(j.inertia, mass_fixed=True, rotary=j.rotary, joint=axis)
-        for axis, j in found.items()
+        axis: AxisModel(j.inertia, mass_fixed=True, rotary=j.rotary, joint=given[axis])
+        for axis, j in joints_of(text, file, given).items()
     }
     return replace(begun, axes=axes, mjcf=text, mjcf_name=file)
 

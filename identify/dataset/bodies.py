@@ -125,9 +125,9 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
     """
     if not model.joints:
         return {}
-    from twin.mujoco.mechanism import mechanism_of  # MuJoCo takes long to load
+    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
 
-    mechanism = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    mechanism = mechanism_in(model)
     _require_joints(mechanism.axes, model, log, name)
     told = [log.axes[axis] for axis in mechanism.axes]
     readings = (together(a.position, a.columns.get("velocity"), log.period)[0] for a in told)

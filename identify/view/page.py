@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +72,12 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
     """Shapes where they stand at rest, the joints that move them, camera and marks."""
     model, data = stage.model, mujoco.MjData(stage.model)
     mujoco.mj_forward(model, data)
-    joints = [replay.machine.joints.get(axis, axis) for axis in replay.axes]
-    names = {int(model.joint(joint).id): i for i, joint in enumerate(joints)}
-    chains = [_chain(model, data, body, names) for body in range(model.nbody)]
+    numbers = {axis: i for i, axis in enumerate(replay.axes)}
+    moves = {
+        joint: ([[numbers[axis], ratio] for axis, ratio in ratios.items()], begin)
+        for joint, (ratios, begin) in stage.moves.items()
+    }
+    chains = [_chain(model, data, body, moves) for body in range(model.nbody)]
     links = [chain for i, chain in enumerate(chains) if chain not in chains[:i]]
     link_of = [links.index(chain) for chain in chains]
     meshes: dict[int, int] = {}
@@ -106,21 +109,24 @@ def _scene(stage: Stage, replay: Replay) -> dict[str, Any]:
 
 
 def _chain(
-    model: mujoco.MjModel, data: mujoco.MjData, body: int, names: dict[int, int]
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    body: int,
+    moves: Mapping[int, tuple[list[list[float]], float]],
 ) -> list[dict[str, Any]]:
     """The axes that move a body, from the world on."""
-    chain = [] if body == 0 else _chain(model, data, int(model.body_parentid[body]), names)
+    chain = [] if body == 0 else _chain(model, data, int(model.body_parentid[body]), moves)
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     return chain + [
         {
-            "axis": names[j],
+            "axes": moves[j][0],
             "hinge": bool(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE),
             "along": _short(data.xaxis[j]),
             "through": _short(data.xanchor[j]),
-            "zero": float(model.qpos0[model.jnt_qposadr[j]]),
+            "zero": float(model.qpos0[model.jnt_qposadr[j]]) - moves[j][1],
         }
         for j in range(first, first + count)
-        if j in names
+        if j in moves
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from identify.view.replay import Replay
 from twin.model.machine import MachineModel
-from twin.mujoco.mechanism import read_bodies
+from twin.mujoco.mechanism import mechanism_in, read_bodies
 from twin.mujoco.mjcf import machine_spec, read_spec
 from twin.signals import Array
 
@@ -31,13 +31,14 @@ SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A compiled model. at: address of each axis in qpos; marks: by axis a body and a place in it.
+    """A compiled model. marks: by axis a body and a place in it.
 
+    moves: by joint the ratios of the axes of which its position is a sum, and what is added.
     data: the machine as measured; ghost: as modelled; aim: as commanded.
     """
 
     model: mujoco.MjModel
-    at: Mapping[str, int]
+    moves: Mapping[int, tuple[Mapping[str, float], float]]
     marks: Mapping[str, tuple[int, Array]]
     data: mujoco.MjData
     ghost: mujoco.MjData
@@ -50,21 +51,25 @@ class Stage:
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         machine = replay.machine
-        joints = {axis: machine.joints.get(axis, axis) for axis in machine.axes}
-        at = {axis: int(model.joint(joint).qposadr[0]) for axis, joint in joints.items()}
+        joints, moves = _joints(machine, model)
         others = (mujoco.MjData(model) for _ in range(2))
         marks = {axis: _mark(model, data, joints[axis]) for axis in replay.axes}
-        return cls(model, at, marks, data, *others)
+        return cls(model, moves, marks, data, *others)
 
     def pose(self, replay: Replay, frame: int, gain: float) -> None:
         """Stand as in a frame, with the differences to the measured machine enlarged."""
+        shown = (self.data, self.ghost, self.aim)
+        places = {}
         for axis, own in replay.axes.items():
             measured = own.measured[frame]
-            self.data.qpos[self.at[axis]] = measured
-            for data, other in ((self.ghost, own.modelled), (self.aim, own.setpoint)):
-                # Nothing is drawn where nothing is known: see ``drawn``.
-                data.qpos[self.at[axis]] = measured + gain * np.nan_to_num(other[frame] - measured)
-        for data in (self.data, self.ghost, self.aim):
+            off = np.array([0.0, own.modelled[frame] - measured, own.setpoint[frame] - measured])
+            # Nothing is drawn where nothing is known: see ``drawn``.
+            places[axis] = measured + gain * np.nan_to_num(off)
+        for joint, (ratios, begin) in self.moves.items():
+            at = begin + sum(ratio * places[axis] for axis, ratio in ratios.items())
+            for data, position in zip(shown, at, strict=True):
+                data.qpos[self.model.jnt_qposadr[joint]] = position
+        for data in shown:
             mujoco.mj_kinematics(self.model, data)
 
     def mark(self, axis: str) -> Array:
@@ -93,6 +98,21 @@ class Stage:
                     self.mark(axis), np.eye(3).ravel(), np.array(MARK, dtype=np.float32),
                 )  # fmt: skip
                 scene.ngeom += 1
+
+
+def _joints(
+    machine: MachineModel, model: mujoco.MjModel
+) -> tuple[dict[str, str], dict[int, tuple[dict[str, float], float]]]:
+    """The joint at which each axis is marked, and how the joints move with the axes."""
+    if not machine.joints:
+        own = {axis: axis for axis in machine.axes}
+        return own, {int(model.joint(axis).id): ({axis: 1.0}, 0.0) for axis in own}
+    found = mechanism_in(machine)
+    rows = zip(found.transmission.by.tolist(), found.transmission.offset.tolist(), strict=True)
+    return dict(zip(found.axes, found.joints, strict=True)), {
+        joint: ({a: r for a, r in zip(found.axes, row, strict=True) if r}, begin)
+        for joint, (row, begin) in enumerate(rows)
+    }
 
 
 def _spec(replay: Replay) -> mujoco.MjSpec:

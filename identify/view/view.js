@@ -50,7 +50,8 @@ const unit = (a) => a.map((v) => v / (Math.hypot(...a) || 1));
 function placed(link, position) {
   let m = Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1);
   for (const joint of data.links[link]) {
-    const by = position(data.axes[joint.axis]) - joint.zero, [x, y, z] = joint.along;
+    const by = joint.axes.reduce((sum, [axis, ratio]) => sum + ratio * position(data.axes[axis]), -joint.zero);
+    const [x, y, z] = joint.along;
     if (!joint.hinge) {
       m = times(m, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, by * x, by * y, by * z, 1]);
       continue;

@@ -11,7 +11,20 @@ import arms
 import mujoco
 import numpy as np
 import pytest
-from arms import ARM, COULOMB, JOINTS, SAMPLE, STEEP, VISCOUS, arm_log, arm_of, friction
+from arms import (
+    ARM,
+    COULOMB,
+    COUPLED,
+    JOINTS,
+    MOTORS,
+    SAMPLE,
+    STEEP,
+    VISCOUS,
+    arm_log,
+    arm_of,
+    coupled_log,
+    friction,
+)
 from cli_runs import refusal, twin
 from strict_json import valid
 
@@ -105,6 +118,25 @@ def test_a_joint_that_follows_an_axis_needs_no_sensor():
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
     run = compare(found.model, {"1": logs["1"]}).axes
     assert all(max(run[joint].position_error.values()) < 2e-3 for joint in JOINTS[:2])
+
+
+def test_friction_of_a_tendon_is_found_on_its_axis_and_nowhere_else():
+    """Of a file that is proposed by the motors' names, whose own friction is not taken over."""
+    logs = {str(seed): coupled_log(seed) for seed in (1, 2)}
+    model = first_model(logs, "arm", load_catalogue(), ("arm.xml", COUPLED))
+    assert model.joints == MOTORS
+    found = fit(model, {"1": logs["1"]}, {"2": logs["2"]})
+    for axis, coulomb, viscous in zip(MOTORS, COULOMB, VISCOUS, strict=True):
+        values = found.fits[axis].axis["coulomb_viscous"].values
+        assert values["Fc"] == pytest.approx(coulomb, rel=0.02)
+        assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
+        (error,) = compare(found.model, {"2": logs["2"]}).axes[axis].position_error.values()
+        assert error < 2e-3
+    drag = Fitted.at_start(load_catalogue()["viscous_friction"])
+    less = model.with_axis("roll", replace(model.axes["roll"], effects=(drag,)))
+    lacking = fit(less, {"1": logs["1"]}, {"2": logs["2"]})
+    named = {a: diagnose_axis(lacking.fits[a], lacking.datasets[a], FEW).named for a in MOTORS}
+    assert named == {"base": (), "lift": (), "roll": ("coulomb_viscous",)}
 
 
 @pytest.mark.parametrize(

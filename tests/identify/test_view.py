@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arms import ARM, JOINTS, SAMPLE, arm_log
+from arms import ARM, COUPLED, JOINTS, MOTORS, SAMPLE, SUMS, arm_log, coupled_log
 from axis_kinds import MACHINES, machine
 from browser import Browser, browser
 from cli_runs import RATE, in_small, process, refusal, twin
@@ -135,7 +135,8 @@ def test_differences_are_drawn_so_large_that_they_are_seen(shown) -> None:
         stage, frame = Stage.of(shown), len(shown) // 2
         stage.pose(shown, frame, gain)
         axis = shown.axes["x"]
-        off = stage.ghost.qpos[stage.at["x"]] - stage.data.qpos[stage.at["x"]]
+        at = stage.model.joint("x").qposadr[0]
+        off = stage.ghost.qpos[at] - stage.data.qpos[at]
         assert off == pytest.approx(gain * (axis.modelled - axis.measured)[frame])
     drawn = shown.gain * np.nanmax(np.abs(axis.modelled - axis.measured)) / np.ptp(axis.measured)
     assert 0.02 < drawn < 0.5
@@ -183,6 +184,16 @@ def jointed(text: str) -> Replay:
     axes = {joint: AxisModel(0.0, rotary=True, joint=joint) for joint in JOINTS}
     model = MachineModel("arm", axes, 1.0 / SAMPLE, text, "arm.xml")
     return replay(model, arm_log(1, duration=2.0), "log")
+
+
+def test_joints_stand_as_tendons_say() -> None:
+    axes = {axis: AxisModel(0.0, rotary=True, joint=joint) for axis, joint in MOTORS.items()}
+    log = coupled_log(1).part(0, 500)
+    what = replay(MachineModel("arm", axes, 1.0 / SAMPLE, COUPLED, "arm.xml"), log, "log")
+    stage, last = Stage.of(what), len(what) - 1
+    stage.pose(what, last, 1.0)
+    lengths = [what.axes[axis].measured[last] for axis in MOTORS]
+    np.testing.assert_allclose(SUMS @ stage.data.qpos, lengths)
 
 
 def test_an_arm_whose_shapes_are_not_there_is_drawn_as_rods() -> None:

@@ -33,7 +33,7 @@ from twin.effect import (
     X,
 )
 from twin.model.machine import AxisModel
-from twin.mujoco.callback import USER_HEADER, word_at
+from twin.mujoco.callback import USER_HEADER, summed, word_at
 
 # Columns of the gain table, one row an axis.
 KP, KI, KD, SMOOTHING, MASS_FF, LIMIT, RESOLUTION = range(7)
@@ -159,21 +159,22 @@ def control_axis(a, x, v, lead, table, sensing_states, gains, states, setpoint, 
 
 @compiled(nogil=True)
 def run_mujoco(
-    step, model, data, off, where, user_at, first_sample, dt, table, sensing_states, gains,
+    step, model, data, off, attached, first_sample, dt, table, sensing_states, gains,
     controller_states, setpoints, noise, watched, signals, forces, states,
 ):  # fmt: skip
     """Run some samples in MuJoCo.
 
-    where (n_axes, 3): qpos, dof and actuator index. setpoints (n, n_axes, 4), noise (n, n_axes) m.
-    watched: indices of the states to log. Filled: signals (n, n_axes, 4), forces (n, n_entries),
-    states (n, n_watched).
+    attached: userdata, axes and parts as ``Attached`` has them. setpoints (n, n_axes, 4), noise
+    (n, n_axes) m. watched: indices of the states to log. Filled: signals (n, n_axes, 4), forces
+    (n, n_entries), states (n, n_watched).
     """
     n, n_axes = noise.shape
     n_entries = forces.shape[1]
     n_states = sensing_states.shape[0]
     io = np.zeros(IO_SIZE)
-    (table, sensing_states, gains, controller_states, setpoints, signals) = borrow(
-        (table, sensing_states, gains, controller_states, setpoints, signals)
+    user_at, where, parts = attached
+    (where, parts, table, sensing_states, gains, controller_states, setpoints, signals) = borrow(
+        (where, parts, table, sensing_states, gains, controller_states, setpoints, signals)
     )
     userdata, qpos_at, qvel_at, ctrl_at = off
     qpos = doubles_at(word_at(data + qpos_at))
@@ -188,8 +189,9 @@ def run_mujoco(
         io[TIME] = origin + (first_sample + k) * dt
         for a in range(n_axes):
             ctrl[where[a, 2]] = control_axis(
-                a, qpos[where[a, 0]], qvel[where[a, 1]], 0.5 * dt, table, sensing_states, gains,
-                controller_states, setpoints[k, a], noise[k, a], borrow(io), signals[k, a],
+                a, summed(where[a], parts, 0, qpos), summed(where[a], parts, 1, qvel), 0.5 * dt,
+                table, sensing_states, gains, controller_states, setpoints[k, a], noise[k, a],
+                borrow(io), signals[k, a],
             )  # fmt: skip
         call_at(step, (model, data))
         for i in range(n_entries):

@@ -32,7 +32,7 @@ from twin.importers.table import Table, numbers
 from twin.logs.container import reading
 from twin.logs.log import HELD, Array, AxisLog, Log
 from twin.logs.topics import instant, is_calendar
-from twin.numbers import first_not_finite
+from twin.numbers import first_not_finite, independent
 
 
 def rate_of(time: Array) -> float:
@@ -371,7 +371,7 @@ def at_joints(axes: Mapping[str, AxisLog], gears: Gears) -> dict[str, AxisLog]:
                 f"axes.{motor}.gear: the map has no axis '{unknown[0]}'; it has {', '.join(names)}"
             )
         ratios[names.index(motor)] = [row.get(joint, 0.0) for joint in names]
-    if abs(np.linalg.det(ratios / np.abs(ratios).max(axis=1, keepdims=True))) < 1e-9:
+    if not independent(ratios):
         raise InputError(
             "gear: the motors of the map do not tell all joints, as their ratios depend on each "
             "other; give each motor its own joint"

@@ -172,7 +172,7 @@ class AxisModel:
     rotary: bool = False
     """Whether the axis turns: all lengths are then angles (rad), forces torques (N m)."""
     joint: str | None = None
-    """Name of its joint in the machine's MuJoCo file, whose bodies it moves; None: a plain axis."""
+    """Name of its joint or fixed tendon in the machine's MuJoCo file; None: a plain axis."""
 
     def __post_init__(self) -> None:
         name, unit = self.units.mass_name, self.units.mass
@@ -324,7 +324,7 @@ class MachineModel:
 
     @property
     def joints(self) -> dict[str, str]:
-        """Name of the joint of each axis that is one of a mechanism."""
+        """Name of the joint or tendon of each axis that is one of a mechanism."""
         return {name: axis.joint for name, axis in self.axes.items() if axis.joint is not None}
 
     @property

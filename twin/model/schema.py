@@ -73,8 +73,8 @@ class AxisEntry(Entries):
     inertia: Moved | None = _moved("kg m^2", "moment of inertia", "torque")
     joint: str | None = Field(
         None, min_length=1, max_length=200,
-        description="the name of a hinge or slide joint of the MJCF or URDF file, whose bodies the "
-        "axis moves, in place of a mass or inertia",
+        description="the name of a hinge or slide joint of the MJCF or URDF file, or of a fixed "
+        "tendon, whose bodies the axis moves, in place of a mass or inertia",
     )  # fmt: skip
     fixed: list[Name] | None = Field(
         None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import carray, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from twin.core.compiled import callback, compiled, doubles_at
 from twin.core.native import LAST_ACCELERATION, LAST_NET, LAST_VELOCITY, Table, axis_force
@@ -41,6 +42,7 @@ from twin.effect import (
     V,
     X,
 )
+from twin.signals import Array
 from twin.threads import entered_once
 
 if TYPE_CHECKING:
@@ -49,9 +51,10 @@ if TYPE_CHECKING:
 UNKNOWN_LAYOUT = "this MuJoCo lays out its structs in an unknown way; report its version"
 NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
-HEADER = 6  # period, axes, states, entries, parameters, first userdata
+HEADER = 7  # period, axes, states, entries, parameters, first userdata, parts
 USER_HEADER = 2  # time of the last call, s; time origin, s; then the states
-AXIS_COLUMNS = 8  # first entry, last entry, first state, mass, qpos, dof, actuator, rotor
+AXIS_COLUMNS = 8  # first part, last part, actuator, first entry, last entry, state, mass, rotor
+PART_COLUMNS = 3  # of a joint that is part of an axis: qpos, dof, ratio
 
 
 class Offsets(NamedTuple):
@@ -154,6 +157,15 @@ def view(address, shape):
 
 
 @compiled(inline=True)
+def summed(axis, parts, column, values):
+    """Sum of the joints' values that an axis is; axis: first and last part; column: addresses."""
+    total = 0.0
+    for i in range(int(axis[0]), int(axis[1])):
+        total += parts[i, 2] * values[int(parts[i, column])]
+    return total
+
+
+@compiled(inline=True)
 def begin_sample(time, committed, start, after):
     """Make ``start`` the states at the start of this sample, and ``after`` a copy of them.
 
@@ -182,8 +194,10 @@ def passive_forces(block, data, off):
     n_axes = int(header[1])
     n_states = int(header[2])
     n_entries = int(header[3])
-    table = HEADER + AXIS_COLUMNS * n_axes
+    n_parts = int(header[6])
+    table = HEADER + AXIS_COLUMNS * n_axes + PART_COLUMNS * n_parts
     axes = view(block + 8 * HEADER, (n_axes, AXIS_COLUMNS))
+    parts = view(block + 8 * (HEADER + AXIS_COLUMNS * n_axes), (n_parts, PART_COLUMNS))
     entries = view(block + 8 * table, (n_entries, 4))
     parameters = view(block + 8 * (table + 4 * n_entries), int(header[4]))
     user = word_at(data + off[1]) + 8 * int(header[5])
@@ -204,28 +218,29 @@ def passive_forces(block, data, off):
     io[WHEN] = 1.0
     for a in range(n_axes):
         if axes[a, 7] >= 0.0:
-            io[SPEEDS + a] = qvel[int(axes[a, 5])]
+            io[SPEEDS + a] = summed(axes[a], parts, 1, qvel)
     for a in range(n_axes):
+        own = int(axes[a, 5])
+        io[X] = summed(axes[a], parts, 0, qpos)
+        io[V] = summed(axes[a], parts, 1, qvel)
         if axes[a, 7] >= 0.0:  # what the bodies took: all forces of the sample before, less rotor's
-            own = int(axes[a, 2])
-            gained = (qvel[int(axes[a, 5])] - start[own + LAST_VELOCITY]) / dt
+            gained = (io[V] - start[own + LAST_VELOCITY]) / dt
             io[LOAD] = start[own + LAST_NET] - axes[a, 7] * gained
-        io[X] = qpos[int(axes[a, 4])]
-        io[V] = qvel[int(axes[a, 5])]
-        io[U] = ctrl[int(axes[a, 6])]
-        io[MASS] = axes[a, 3]
-        io[MOVED] = axes[a, 3]
+        command = ctrl[int(axes[a, 2])]
+        io[U] = command
+        io[MASS] = axes[a, 6]
+        io[MOVED] = axes[a, 6]
         if n_axes == 2:  # no law of a larger machine reads them (MachineModel)
             b = 1 - a
-            io[X_OTHER] = qpos[int(axes[b, 4])]
-            io[V_OTHER] = qvel[int(axes[b, 5])]
-            io[A_OTHER] = start[int(axes[b, 2]) + LAST_ACCELERATION]
+            io[X_OTHER] = summed(axes[b], parts, 0, qpos)
+            io[V_OTHER] = summed(axes[b], parts, 1, qvel)
+            io[A_OTHER] = start[int(axes[b, 5]) + LAST_ACCELERATION]
         # What the structure adds is known for the log; MuJoCo's own bodies put it on the axis.
         force, _ = axis_force(
-            entries, int(axes[a, 0]), int(axes[a, 1]), parameters, after, int(axes[a, 2]), io,
-            rows, 0,
-        )  # fmt: skip
-        passive[int(axes[a, 5])] += force - ctrl[int(axes[a, 6])]  # MuJoCo adds the command
+            entries, int(axes[a, 3]), int(axes[a, 4]), parameters, after, own, io, rows, 0
+        )
+        for i in range(int(axes[a, 0]), int(axes[a, 1])):  # MuJoCo adds the command
+            passive[int(parts[i, 1])] += parts[i, 2] * (force - command)
 
 
 @cache
@@ -249,7 +264,7 @@ def _callback(off: Offsets) -> Any:
 
 
 class Driven(NamedTuple):
-    """An axis in a spec: its joint and motor, and the mass (kg) by which friction stops it.
+    """An axis in a spec: its joint or fixed tendon, its motor, and the mass (kg) of its friction.
 
     rotor: kg, of its own inertia beside the bodies of a mechanism; below 0 on a plain axis.
     """
@@ -260,27 +275,65 @@ class Driven(NamedTuple):
     rotor: float = -1.0
 
 
-def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: Sequence[Driven]) -> int:
-    """Write the table into the spec; returns where its userdata begins.
+Parts = list[tuple[int, float]]  # joints and ratios, by which they add up to an axis
 
-    axes: in the table's order.
+
+def parts_of(model: mujoco.MjModel, name: str) -> Parts:
+    """The joint of that name, or those of the fixed tendon; none of a spatial one."""
+    import mujoco
+
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    return [(joint, 1.0)] if joint >= 0 else tendon_parts(model, model.tendon(name).id)
+
+
+def tendon_parts(model: mujoco.MjModel, tendon: int) -> Parts:
+    """The joints that a fixed tendon is a sum of; none of a spatial one."""
+    import mujoco
+
+    first = model.tendon_adr[tendon]
+    own = slice(first, first + model.tendon_num[tendon])
+    is_fixed = np.all(model.wrap_type[own] == mujoco.mjtWrap.mjWRAP_JOINT)
+    pairs = zip(model.wrap_objid[own].tolist(), model.wrap_prm[own].tolist(), strict=True)
+    return list(pairs) if is_fixed else []
+
+
+class Attached(NamedTuple):
+    """Where a table's axes are in a model. user_at: where its userdata begins.
+
+    axes (n_axes, 3): first and last part, actuator; parts (n_parts, 3): qpos, dof and ratio of the
+    joints whose sum an axis is.
     """
+
+    user_at: int
+    axes: NDArray[np.int64]
+    parts: Array
+
+
+def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: Sequence[Driven]) -> Attached:
+    """Write the table into the spec; axes: in the table's order."""
     model = spec.compile()
-    user_at = model.nuserdata
-    spans = []
-    for axis, (first, last, state, _, _) in zip(axes, table.axes, strict=True):
-        joint, motor = model.joint(axis.joint), model.actuator(axis.motor)
-        at = joint.qposadr[0], joint.dofadr[0], motor.id
-        spans.append((first, last, state, axis.mass, *at, axis.rotor))
+    own = [parts_of(model, axis.joint) for axis in axes]
+    ends = np.cumsum([0, *map(len, own)])
+    motors = [model.actuator(axis.motor).id for axis in axes]
+    where = np.column_stack([ends[:-1], ends[1:], motors])
+    joints, ratios = np.transpose([part for parts in own for part in parts])
+    at = joints.astype(np.int64)
+    parts = np.column_stack([model.jnt_qposadr[at], model.jnt_dofadr[at], ratios])
+    spans = [
+        (*place, *entry[:3], axis.mass, axis.rotor)
+        for axis, place, entry in zip(axes, where, table.axes, strict=True)
+    ]
     # Doubles hold any address below 2^53 exactly, so that a table can travel in an mjModel.
     numbers = [
-        period, len(axes), table.n_states, len(table.entries), len(table.parameters), user_at,
-        *np.ravel(spans), *table.entries.ravel(), *table.parameters,
+        period, len(axes), table.n_states, len(table.entries), len(table.parameters),
+        model.nuserdata, len(parts), *np.ravel(spans), *parts.ravel(), *table.entries.ravel(),
+        *table.parameters,
     ]  # fmt: skip
     numbers += [len(numbers) + 2, MAGIC]
     spec.add_numeric(name=NUMERIC, data=numbers, size=len(numbers))
-    spec.nuserdata = user_at + USER_HEADER + 2 * table.n_states + len(table.entries) + IO_SIZE
-    return user_at
+    size = USER_HEADER + 2 * table.n_states + len(table.entries) + IO_SIZE
+    spec.nuserdata = model.nuserdata + size
+    return Attached(model.nuserdata, where, parts)
 
 
 @entered_once

@@ -10,9 +10,8 @@ so that a weak form integrates the momentum by parts, and nothing is differentia
 4.3). dM/dt v is the change of M v as the joints move on with v. All of it is computed natively, by
 the same library as the callback.
 
-A joint that is no axis may follow one, by an equality constraint that is linear in its position,
-as the second finger of a gripper does: then it moves by a ratio of the axis, and its forces reach
-the axis by the same ratio.
+An axis is a joint or a fixed tendon; the other joints move with the axes, and their forces reach
+these, by the transmission of the file (``transmission``).
 
 What a joint has of friction, damping, springs and rotor inertia is the matter of the machine
 model's effects, and is not among the bodies. Geometry is needed for none of this, so that the
@@ -21,26 +20,25 @@ meshes of a file need not be there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.core.compiled import call_at, compiled
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import Driven, native_address, offsets, view, word_at
 from twin.mujoco.mjcf import add_motor, read_spec
+from twin.mujoco.transmission import HINGE, SLIDE, Transmission, transmission_of
 from twin.signals import Array
 
 CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
 AHEAD = 1e-6  # rad or m, by which the joints move on, of the change of the mass matrix
-PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of a joint, which are effects here
-SLIDE, HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of an axis, which are effects here
 
 
 def read_bodies(text: str, name: str) -> mujoco.MjSpec:
@@ -71,38 +69,19 @@ def _is_mesh(geom: mujoco.MjsGeom) -> bool:
     return geom.type in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """By which axis each joint moves: at its position times ratio (n_joints,), plus offset.
-
-    axis (n_joints,): its number. Hinges and slides: joints, positions and degrees of freedom are as
-    many, in one order.
-    """
-
-    axis: NDArray[np.int64]
-    ratio: Array
-    offset: Array
-
-    def reduced(self, full: Array, n_axes: int) -> Array:
-        """A matrix (n_joints, n_joints) of the joints as one (n_axes, n_axes) of the axes."""
-        by = np.zeros((len(self.axis), n_axes))
-        by[np.arange(len(self.axis)), self.axis] = self.ratio
-        return np.asarray(by.T @ full @ by)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Mechanism:
-    """The bodies of a machine, whose axes are joints.
+    """The bodies of a machine, whose axes are joints or tendons.
 
-    model: of the bodies alone. places (n_axes,): of each axis among the joints. inertia (n_axes,):
-    kg or kg m^2, that of the bodies about each joint, the mean over poses. freed (n_axes,): the
-    least that is felt at each where all others are free.
+    model: of the bodies alone. places (n_axes,): of each axis among the joints, of a tendon one of
+    its joints. inertia (n_axes,): kg or kg m^2, that of the bodies about each axis, the mean over
+    poses. freed (n_axes,): the least that is felt at each where all others are free.
     """
 
     model: mujoco.MjModel
     axes: tuple[str, ...]
-    places: NDArray[np.int64]
-    followed: Followed
+    places: Sequence[int]
+    transmission: Transmission
     inertia: Array
     freed: Array
 
@@ -116,15 +95,16 @@ class Mechanism:
         everything else is made of the smooth one. dp/dt and the second sum to the forces at the
         joints.
         """
-        rows = (np.ascontiguousarray(a, dtype=float) for a in (position, velocity, smooth))
-        momentum, force = np.empty((2, *position.shape))
+        joints, by = self.transmission, self.transmission.by
+        rows = (joints.joints(position), by @ velocity, by @ smooth)
+        momentum, force = np.empty((2, len(by), position.shape[1]))
         data = mujoco.MjData(self.model)
         _along(
             tuple(map(native_address, CALLS)), self.model._address, data._address,
-            tuple(offsets()[2:]), self.followed.axis, self.followed.ratio, self.followed.offset,
-            *rows, np.zeros((5, self.model.nv)), momentum, force,
+            tuple(offsets()[2:]), *map(np.ascontiguousarray, rows), np.zeros((4, len(by))),
+            momentum, force,
         )  # fmt: skip
-        return momentum, force
+        return by.T @ momentum, by.T @ force
 
     def carried(self, position: Array, acceleration: Array) -> Array:
         """Force (n_axes, n) that holds the bodies' weight and accelerates them, SI units.
@@ -135,12 +115,15 @@ class Mechanism:
         return momentum + force
 
     @property
+    def joints(self) -> tuple[str, ...]:
+        """Name of the joint of each axis, of a tendon that of ``places``."""
+        return tuple(self.model.joint(j).name for j in self.places)
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Name of the body that each axis moves, or of its joint where the body has none."""
-        model = self.model
-        return tuple(
-            model.body(model.jnt_bodyid[j]).name or model.joint(j).name for j in self.places
-        )
+        numbered = enumerate(self.joints)
+        return tuple(self.model.body(self._body(a)).name or joint for a, joint in numbered)
 
     def _body(self, axis: int) -> int:
         """Number of the body that an axis moves."""
@@ -150,7 +133,7 @@ class Mechanism:
         """The axes whose forces the body of one changes: its own, and those that carry it."""
         dof, found = int(self.places[axis]), set[int]()
         while dof >= 0:
-            found.add(int(self.followed.axis[dof]))
+            found.update(np.flatnonzero(self.transmission.by[dof]).tolist())
             dof = int(self.model.dof_parentid[dof])
         return sorted(found)
 
@@ -197,90 +180,40 @@ def _of_point(mass: float, place: Array) -> Array:
 
 
 def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:
-    """The mechanism of an MJCF or URDF text; joints: axis -> name of its joint.
+    """The mechanism of an MJCF or URDF text; joints: axis -> name of its joint or fixed tendon.
 
-    Raises InputError where a joint is not in the file or cannot be an axis, where two axes have the
-    same, and where a joint of the file is no axis: its motion is not known.
+    Raises InputError where one is not in the file or cannot be an axis, where axes depend on each
+    other, and where the motion of a joint of the file is not known from the axes.
     """
     return _mechanism(text, name, tuple(joints.items()))
+
+
+def mechanism_in(model: MachineModel) -> Mechanism:
+    """The mechanism of a machine whose axes are joints; raises InputError as ``mechanism_of``."""
+    return mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
 
 
 @lru_cache(maxsize=4)  # each command asks for that of its one model several times
 def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mechanism:
     spec = read_bodies(text, name)
-    for joint in spec.joints:
-        _strip(joint)
+    _strip(spec, dict(joints).values())
     try:
         model = spec.compile()
     except ValueError as error:
         said = " ".join(str(error).split())
         raise InputError(f"{name}: MuJoCo cannot build it: {said}") from error
-    found = {model.joint(j).name: j for j in range(model.njnt)}
-    at = _require_axes(model, name, joints, found)
-    followed = _followed(model, name, at)
+    transmission = transmission_of(model, name, dict(joints))
     axes = tuple(axis for axis, _ in joints)
-    return Mechanism(model, axes, at, followed, *_inertias(model, at, followed))
-
-
-def _require_axes(
-    model: mujoco.MjModel, name: str, joints: Sequence[tuple[str, str]], found: Mapping[str, int]
-) -> NDArray[np.int64]:
-    """Which joint each axis is."""
-    used: dict[str, str] = {}
-    for axis, joint in joints:
-        if joint not in found:
-            raise InputError(
-                f"axis {axis}: joint = '{joint}' is not in {name}, which has "
-                f"{', '.join(n or 'one without a name' for n in found)}; give one of these"
-            )
-        if joint in used:
-            raise InputError(
-                f"axis {axis}: joint = '{joint}' is that of axis {used[joint]}; give each its own"
-            )
-        if model.joint(joint).type not in (SLIDE, HINGE):
-            raise InputError(
-                f"axis {axis}: joint '{joint}' of {name} is neither a hinge nor a slide; a free or "
-                "a ball joint cannot be an axis"
-            )
-        used[joint] = axis
-    return np.array([found[joint] for joint in used], dtype=np.int64)
-
-
-def _followed(model: mujoco.MjModel, name: str, at: NDArray[np.int64]) -> Followed:
-    """The axis that each joint is or follows; InputError where the motion of one is not known."""
-    axis, ratio, offset = np.full(model.njnt, -1), np.ones(model.njnt), np.zeros(model.njnt)
-    axis[at] = np.arange(len(at))
-    ties = list(_ties(model))
-    for _ in ties:  # one may follow by another
-        for one, other, slope, begin in ties:
-            if axis[one] < 0 <= axis[other]:
-                axis[one] = axis[other]
-                ratio[one], offset[one] = slope * ratio[other], begin + slope * offset[other]
-    lacking = [model.joint(j).name or "one without a name" for j in np.flatnonzero(axis < 0)]
-    if lacking:
-        raise InputError(
-            f"{name}: the joints {', '.join(lacking)} are no axes, so that their motion is not "
-            "known; measure them as axes, tie them to one by an equality of the file, or take "
-            "them out of it"
-        )
-    return Followed(axis.astype(np.int64), ratio, offset)
-
-
-def _ties(model: mujoco.MjModel) -> Iterator[tuple[int, int, float, float]]:
-    """Of each linear equality of two joints: q_one = slope q_other + begin, both ways round."""
-    for k in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
-        one, other = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        constant, slope, *bends = model.eq_data[k, :5]
-        if other < 0 or slope == 0.0 or any(bends):
-            continue
-        begin = model.qpos0[one] + constant - slope * model.qpos0[other]
-        yield one, other, float(slope), float(begin)
-        yield other, one, float(1.0 / slope), float(-begin / slope)
+    inertias = _inertias(model, transmission)
+    return Mechanism(model, axes, transmission.places(), transmission, *inertias)
 
 
 @dataclass(frozen=True)
 class Joint:
-    """What a joint is to its axis: whether it turns, and its bodies' inertia, kg or kg m^2."""
+    """What its joint or tendon is to an axis: whether it turns, and the inertia, kg or kg m^2.
+
+    A tendon turns where all its joints do: it is then a sum of angles.
+    """
 
     rotary: bool
     inertia: float
@@ -289,14 +222,12 @@ class Joint:
 def joints_of(text: str, name: str, joints: Mapping[str, str]) -> dict[str, Joint]:
     """The joints of an MJCF or URDF text by axis; raises InputError as ``mechanism_of`` does."""
     found = mechanism_of(text, name, joints)
-    turns = found.model.jnt_type[found.places] == HINGE
+    turns = ~np.any(found.transmission.rows[:, found.model.jnt_type == SLIDE], axis=1)
     pairs = zip(joints, turns, found.inertia, strict=True)
     return {axis: Joint(bool(turns), float(inertia)) for axis, turns, inertia in pairs}
 
 
-def _inertias(
-    model: mujoco.MjModel, at: NDArray[np.int64], followed: Followed
-) -> tuple[Array, Array]:
+def _inertias(model: mujoco.MjModel, joints: Transmission) -> tuple[Array, Array]:
     """Inertia (n_axes,) about each axis, kg or kg m^2, over poses within the joints' ranges.
 
     With all others held the mean: in one pose it may vanish, such as that of a straight arm about
@@ -305,16 +236,15 @@ def _inertias(
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     turns = model.jnt_type == HINGE
     free = np.where(turns, np.pi, 0.0)[:, None] * [-1.0, 1.0]
-    low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free)[at].T
-    total, full = np.zeros(len(at)), np.zeros((model.nv, model.nv))
-    least = np.full(len(at), np.inf)
+    low, high = np.where(model.jnt_limited[:, None] > 0, model.jnt_range, free).T
+    total, full = np.zeros(len(joints.rows)), np.zeros((model.nv, model.nv))
+    least = np.full(len(total), np.inf)
     poses = 256  # over which the inertia about a joint is averaged
     for _ in range(poses):
-        pose = rng.uniform(low, high)
-        data.qpos[:] = followed.ratio * pose[followed.axis] + followed.offset
+        data.qpos[:] = joints.joints(joints.rows @ rng.uniform(low, high))
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
-        own = followed.reduced(full, len(at))
+        own = joints.reduced(full)
         total += np.diag(own) / poses
         least = np.minimum(least, 1.0 / np.diag(np.linalg.inv(own)))
     return total, least
@@ -331,6 +261,8 @@ def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
     for part in (*spec.actuators, *spec.sensors, *spec.keys):
         spec.delete(part)
     spec.option.timestep = model.period
+    for part in _strip(spec, model.joints.values()):
+        part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     for tie in spec.equalities:
         tie.solref[:] = 2.0 * model.period, 1.0  # as stiff as can be: its give is not identified
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
@@ -341,10 +273,8 @@ def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
                     f"axis {axis}: {f.effect.name} hangs bodies on a joint of {name}, which is not "
                     "simulated; put the body and its spring into that file"
                 )
-        joint = spec.joint(own.joint)
-        _strip(joint)
-        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        joint.armature = own.weighed.mass - own.mass
+        part = spec.joint(own.joint) or spec.tendon(own.joint)
+        part.armature = own.weighed.mass - own.mass
         add_motor(spec, axis, own.joint or axis)
     return spec
 
@@ -355,46 +285,43 @@ def driven(model: MachineModel) -> list[Driven]:
     Friction stops a joint by the least inertia that it may have: more than it has would throw it
     back and forth, less stops it a little later.
     """
-    found = mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
+    found = mechanism_in(model)
     return [
         Driven(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
         for (name, axis), least in zip(model.axes.items(), found.freed, strict=True)
     ]
 
 
-def followed_by(model: MachineModel) -> Followed:
-    """The axis that each joint of such a spec is or follows."""
-    return mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints).followed
-
-
-def _strip(joint: mujoco.MjsJoint) -> None:
-    """Take from a joint what is the matter of effects."""
-    for key in PASSIVE:
-        setattr(joint, key, 0.0 * np.asarray(getattr(joint, key)))
+def _strip(spec: mujoco.MjSpec, axes: Collection[str]) -> list[mujoco.MjsJoint | mujoco.MjsTendon]:
+    """Take what is the matter of effects from the joints and from the tendons that are axes."""
+    parts = [*spec.joints, *(t for t in spec.tendons if t.name in axes)]
+    for part in parts:
+        for key in PASSIVE:
+            setattr(part, key, 0.0 * np.asarray(getattr(part, key)))
+    return parts
 
 
 @compiled(nogil=True)
-def _along(
-    calls, model, data, off, axis, ratio, offset, position, velocity, smooth, lent, momentum, force
-):  # fmt: skip
+def _along(calls, model, data, off, position, velocity, smooth, lent, momentum, force):
     kinematics, com_pos, make_m, com_vel, rne, mul_m = calls
-    n_axes, n_dofs = position.shape[0], lent.shape[1]
-    moved, product, before, after, bias = lent
+    n_dofs = position.shape[0]
+    moved, before, after, bias = lent
     qpos = view(word_at(data + off[2]), n_dofs)  # hinges and slides: as many as degrees of freedom
     qvel = view(word_at(data + off[3]), n_dofs)
     speed = word_at(data + off[3])
     for k in range(position.shape[1]):
         fastest = 0.0
         for i in range(n_dofs):
-            a = axis[i]
-            qpos[i] = offset[i] + ratio[i] * position[a, k]
-            qvel[i] = ratio[i] * smooth[a, k]
-            moved[i] = ratio[i] * velocity[a, k]
+            qpos[i] = position[i, k]
+            qvel[i] = smooth[i, k]
+            moved[i] = velocity[i, k]
             fastest = max(fastest, abs(qvel[i]))
         call_at(kinematics, (model, data))
         call_at(com_pos, (model, data))
         call_at(make_m, (model, data))
-        call_at(mul_m, (model, data, product.ctypes.data, moved.ctypes.data))
+        call_at(mul_m, (model, data, after.ctypes.data, moved.ctypes.data))
+        for i in range(n_dofs):
+            momentum[i, k] = after[i]
         call_at(mul_m, (model, data, before.ctypes.data, speed))
         call_at(com_vel, (model, data))
         call_at(rne, (model, data, 0, bias.ctypes.data))  # 0: without accelerations
@@ -405,8 +332,5 @@ def _along(
         call_at(com_pos, (model, data))
         call_at(make_m, (model, data))
         call_at(mul_m, (model, data, after.ctypes.data, speed))
-        for a in range(n_axes):
-            momentum[a, k] = force[a, k] = 0.0
         for i in range(n_dofs):
-            momentum[axis[i], k] += ratio[i] * product[i]
-            force[axis[i], k] += ratio[i] * (bias[i] - (after[i] - before[i]) / ahead)
+            force[i, k] = bias[i] - (after[i] - before[i]) / ahead

@@ -196,8 +196,8 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
 
 
 def add_motor(spec: mujoco.MjSpec, axis: str, joint: str) -> None:
-    """Add the motor of an axis: its command is the force on the joint."""
-    kind = mujoco.mjtTrn.mjTRN_JOINT
+    """Add the motor of an axis: its command is the force on the joint, or on the tendon."""
+    kind = mujoco.mjtTrn.mjTRN_JOINT if spec.joint(joint) else mujoco.mjtTrn.mjTRN_TENDON
     spec.add_actuator(name=f"motor_{axis}", target=joint, trntype=kind).gear[0] = 1.0
 
 

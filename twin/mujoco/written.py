@@ -34,28 +34,29 @@ def inertial(mass: float, centre: Array, inertia: Array) -> str:
     return f'<inertial mass="{mass:.6g}" pos="{pos}" fullinertia="{fullinertia}"/>'
 
 
-def with_joint(text: str, joint: str, attributes: Mapping[str, float]) -> str:
-    """An MJCF text with these attributes of the joint of that name."""
+def with_joint(text: str, joint: str, attributes: Mapping[str, float], tag: str = "joint") -> str:
+    """An MJCF text with these attributes of the joint of that name; tag: of what is no joint."""
 
     def changed(found: re.Match[str]) -> str:
-        tag = found[0]
+        element = found[0]
         # An equality constraint of that name is a joint as well, by its tag.
         if (
-            found["kind"] != "joint"
-            or _attribute(tag, "name") != joint
-            or re.search(r"\sjoint1\s*=", tag)
+            found["kind"] != tag
+            or _attribute(element, "name") != joint
+            or re.search(r"\sjoint1\s*=", element)
         ):
-            return tag
-        return _with(tag, {key: f"{value:.9g}" for key, value in attributes.items()})
+            return element
+        return _with(element, {key: f"{value:.9g}" for key, value in attributes.items()})
 
     return _TAG.sub(changed, text)
 
 
 def with_motor(text: str, joint: str, attributes: Mapping[str, str]) -> str:
-    """An MJCF text with these attributes of the DC motor of that joint."""
+    """An MJCF text with these attributes of the DC motor of that joint or tendon."""
 
     def changed(found: re.Match[str]) -> str:
-        own = found["kind"] == "dcmotor" and _attribute(found[0], "joint") == joint
+        driven = (_attribute(found[0], key) for key in ("joint", "tendon"))
+        own = found["kind"] == "dcmotor" and joint in driven
         return _with(found[0], attributes) if own else found[0]
 
     return _TAG.sub(changed, text)
@@ -80,14 +81,15 @@ def with_inertial(
     """
     from twin.mujoco.mechanism import mechanism_of
 
-    place = _place_of(text, joints[axis])
+    at = list(joints).index(axis)
+    joint = mechanism_of(text, name, joints).joints[at]
+    place = _place_of(text, joint)
     made = text if place is None else text[: place[0]] + element + text[place[1] :]
-    mechanism = mechanism_of(made, name, joints)
-    has = mechanism.inertial(mechanism.axes.index(axis))
+    has = mechanism_of(made, name, joints).inertial(at)
     accuracy = 1e-4  # relative, to which the file holds what is written into it
     if not np.allclose(has, wanted, rtol=accuracy, atol=accuracy * np.abs(wanted).max()):
         raise InputError(
-            f"{name}: the body of joint '{joints[axis]}' does not take its inertia from an "
+            f"{name}: the body of joint '{joint}' does not take its inertia from an "
             f"inertial element in it; write {element} where its inertia is made"
         )
     return made

@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from arms import ARM, COULOMB, JOINTS, VISCOUS, arm_of
+from arms import ARM, COULOMB, COUPLED, JOINTS, MOTORS, VISCOUS, arm_of
 from axis_runs import effect as fitted
 from cli_runs import refusal, twin
 
@@ -124,6 +124,27 @@ def test_springs_and_rotors_are_joints_own_also_in_degrees():
     rotor = export(model(base=fitted("rotor_inertia", inertia=0.07)), {})
     assert mujoco.MjModel.from_xml_string(rotor.files["arm.xml"]).dof_armature[0] == 0.07
     assert "rotor_inertia" in rotor.kept["base"]
+
+
+def test_a_tendon_holds_them_too_and_joints_that_are_no_axes_let_go():
+    spring = fitted("spring", middle=0.2, offset=0.6, k1=1.5)
+    roll = (fitted("rotor_inertia", inertia=0.07), fitted("viscous_friction", c=0.2), spring)
+    own = {"base": (), "lift": model().axes["elbow"].effects, "roll": roll}
+    axes = {
+        axis: AxisModel(1.0, effects=effects, mass_fixed=True, rotary=True, joint=MOTORS[axis])
+        for axis, effects in own.items()
+    }
+    made = export(MachineModel("arm", axes, 1000.0, COUPLED, "arm.xml"), {})
+    assert (made.kept["roll"], made.lost) == (tuple(f.effect.name for f in roll), ())
+    built = mujoco.MjModel.from_xml_string(made.files["arm.xml"])
+    lift, belt = (built.tendon(name).id for name in ("lift", "belt"))
+    assert built.tendon_frictionloss[[lift, belt]].tolist() == [COULOMB[2], 0.0]
+    assert np.ravel(built.tendon_damping)[[lift, belt]] == pytest.approx([VISCOUS[2], 0.2])
+    assert built.tendon_armature[[lift, belt]].tolist() == [0.0, 0.07]
+    assert np.ravel(built.tendon_stiffness)[[lift, belt]].tolist() == [0.0, 1.5]
+    assert built.tendon_lengthspring[belt] == pytest.approx(-0.2)
+    assert np.all(built.dof_frictionloss == 0.0)
+    assert not np.any(built.dof_damping)
 
 
 def test_what_is_lost_is_told_in_newtons_on_a_log():

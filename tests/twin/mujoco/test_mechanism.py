@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from arms import ARM, JOINTS
+from arms import ARM, COUPLED, JOINTS, MOTORS, SUMS
 
 from twin.errors import InputError
 from twin.mujoco.mechanism import mechanism_of
@@ -28,18 +28,36 @@ def smooth_motion(step: float, count: int) -> tuple[np.ndarray, np.ndarray, np.n
 
 TIE = '<equality><joint joint1="elbow" joint2="shoulder" polycoef="0.2 -1.5 0 0 0"/></equality>'
 TIED = ARM.replace("</mujoco>", f"{TIE}</mujoco>")
-ALL = {"text": ARM, "by": np.eye(3), "begun": np.zeros(3)}
-FOLLOWED = {
-    "text": TIED, "by": np.array([[1, 0], [0, 1], [0, -1.5]]), "begun": np.array([0, 0, 0.2]),
+BOTH = '<tendon><fixed name="both"><joint joint="elbow" coef="2"/></fixed></tendon>'
+GRIPPER = TIED.replace("<equality>", f"{BOTH}<equality>")
+SPATIAL = (
+    ARM.replace('<joint name="elbow"', '<site name="b"/><joint name="elbow"')
+    .replace('<body name="fore"', '<site name="a"/><body name="fore"')
+    .replace("</mujoco>", "<tendon><spatial name='rope'>ab</spatial></tendon></mujoco>")
+    .replace("ab<", '<site site="a"/><site site="b"/><')
+)
+TRANSMISSIONS = {
+    "all axes": (ARM, OWN, np.eye(3), 0.0),
+    "the elbow follows": (
+        TIED, {"base": "base", "up": "shoulder"}, [[1, 0], [0, 1], [0, -1.5]], [0, 0, 0.2],
+    ),
+    "tendons of two joints": (COUPLED, MOTORS, np.linalg.inv(SUMS), 0.0),
+    "a tendon of tied joints": (
+        GRIPPER, {"base": "base", "grip": "both"}, [[1, 0], [0, -1 / 3], [0, 0.5]],
+        [0, 0.2 / 1.5, 0],
+    ),
 }  # fmt: skip
+"""File and axes, and with it how the joints move with these: ratios and where they begin."""
 
 
-@pytest.mark.parametrize("of", [ALL, FOLLOWED], ids=["all axes", "the elbow follows"])
+@pytest.mark.parametrize("of", TRANSMISSIONS)
 def test_momentum_form_is_the_inverse_dynamics(of):
-    """A joint that follows an axis is moved, and felt, by the ratio of their motions."""
-    step, n = 1e-3, of["by"].shape[1]
+    """A joint that moves with axes is moved, and felt, by the ratios of their motions."""
+    text, axes, by, begun = TRANSMISSIONS[of]
+    by = np.array(by)
+    step, n = 1e-3, len(axes)
     q, v, a = (rows[:n] for rows in smooth_motion(step, 60))
-    mechanism = mechanism_of(of["text"], "arm.xml", dict(list(OWN.items())[:n]))
+    mechanism = mechanism_of(text, "arm.xml", axes)
     momentum, force = mechanism.along(q, v, v)
     # Of fourth order: a difference of second order would be the larger error.
     near, far = momentum[:, 3:-1] - momentum[:, 1:-3], momentum[:, 4:] - momentum[:, :-4]
@@ -47,10 +65,10 @@ def test_momentum_form_is_the_inverse_dynamics(of):
     model = mujoco.MjModel.from_xml_string(ARM)
     data, wanted = mujoco.MjData(model), []
     for k in range(2, q.shape[1] - 2):
-        data.qpos[:] = of["by"] @ q[:, k] + of["begun"]
-        data.qvel[:], data.qacc[:] = of["by"] @ v[:, k], of["by"] @ a[:, k]
+        data.qpos[:] = by @ q[:, k] + begun
+        data.qvel[:], data.qacc[:] = by @ v[:, k], by @ a[:, k]
         mujoco.mj_inverse(model, data)
-        wanted.append(of["by"].T @ data.qfrc_inverse)
+        wanted.append(by.T @ data.qfrc_inverse)
     largest = np.abs(wanted).max(axis=0)
     assert np.all(np.abs(ours - np.transpose(wanted)).max(axis=1) < 1e-6 * largest)
 
@@ -108,6 +126,14 @@ def test_meshes_and_what_is_an_effect_are_no_bodies(given):
         (ARM, {**OWN, "elbow": "base"}, "is that of axis base"),
         (LOOSE, OWN, "neither a hinge nor a slide"),
         ("<mujoco", OWN, "is not an MJCF or URDF file"),
+        (COUPLED, {"base": "base", "lift": "lift"}, "joints shoulder, elbow are no axes"),
+        (
+            COUPLED,
+            {**MOTORS, "elbow": "elbow"},
+            "axis elbow: .* moves as the axes base, lift, roll",
+        ),
+        (COUPLED, {**MOTORS, "roll": "twist"}, "which has base, shoulder, elbow, lift, belt; give"),
+        (SPATIAL, {**OWN, "elbow": "rope"}, "tendon 'rope' of arm.xml is spatial"),
     ],
 )
 def test_what_cannot_be_an_axis_is_one_line(text, joints, said):

@@ -1,8 +1,9 @@
 """MJCF: the machine's own MuJoCo file with what its joints can hold of the model.
 
-Friction, damping, springs and rotor inertia are attributes of a joint; each effect says which of
-them hold it (``Effect.joint_attributes``). The text of the file stays as it is, but for these. What
-they lose of an effect is told along logs: the force that it makes in the model less that of
+Friction, damping, springs and rotor inertia are attributes of a joint or a tendon; each effect says
+which of them hold it (``Effect.joint_attributes``). The text of the file stays as it is, but for
+these, and for those of joints that are no axes, whose forces are among the axes'. What they lose of
+an effect is told along logs: the force that it makes in the model less that of
 
     -frictionloss sgn(v) - damping v - stiffness (q - springref)
 
@@ -44,6 +45,9 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     at_motor = {a: _at_motor(own, _gear(spec, own.joint or a)) for a, own in model.axes.items()}
     for axis, own in model.axes.items():
         text = _with_attributes(text, name, spec, axis, own, at_motor[axis])
+    if model.joints:
+        for moved in (j for j in spec.joints if j.name not in model.joints.values()):
+            text = with_joint(text, moved.name, _changed(moved, {}))
     judged = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
     return Exported(
         {f"{Path(name).stem}.xml": text},
@@ -66,7 +70,7 @@ def attributes_of(axis: AxisModel) -> dict[str, float]:
 def _with_attributes(
     text: str, name: str, spec: Any, axis: str, own: AxisModel, at_motor: Mapping[str, str]
 ) -> str:
-    """The text with the attributes of one joint; what was there of friction and springs goes.
+    """The text with the attributes of one axis; what was there of friction and springs goes.
 
     spec: of the file. at_motor: the attributes of the joint's motor that hold its friction.
     """
@@ -74,16 +78,24 @@ def _with_attributes(
     if at_motor:
         text = with_motor(text, joint, at_motor)
         wanted.pop("frictionloss", None)
-    there = spec.joint(joint)
-    if there is None:
-        raise InputError(f"{name}: has no joint '{joint}', which is axis {axis}; name them alike")
+    rest = wanted.pop("springref", None)
+    if (there := spec.joint(joint)) is not None:
+        new = _changed(there, wanted)
+        if rest is not None:
+            in_degrees = spec.compiler.degree and own.rotary
+            new["springref"] = np.degrees(rest) if in_degrees else rest
+        return with_joint(text, joint, new)
+    if (tendon := spec.tendon(joint)) is not None:
+        length = {} if rest is None else {"springlength": rest}
+        return with_joint(text, joint, _changed(tendon, wanted) | length, "fixed")
+    raise InputError(f"{name}: has no joint '{joint}', which is axis {axis}; name them alike")
+
+
+def _changed(there: Any, wanted: Mapping[str, float]) -> dict[str, float]:
+    """The attributes of a joint or a tendon that differ from those wanted; others are to be 0."""
     given = {key: np.ravel(getattr(there, key)) for key in PASSIVE}
     zeroed = {key: wanted.get(key, 0.0) for key in given}
-    new = {key: v for key, v in zeroed.items() if given[key][0] != v or np.any(given[key][1:])}
-    if "springref" in wanted:
-        in_degrees = spec.compiler.degree and own.rotary
-        new["springref"] = np.degrees(wanted["springref"]) if in_degrees else wanted["springref"]
-    return with_joint(text, joint, new)
+    return {key: v for key, v in zeroed.items() if given[key][0] != v or np.any(given[key][1:])}
 
 
 def _at_motor(own: AxisModel, gear: float) -> dict[str, str]:
