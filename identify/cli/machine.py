@@ -137,7 +137,7 @@ def new(
     out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
     mjcf: Annotated[
         Path | None,
-        typer.Option("--mjcf", help="MJCF or URDF file whose joints are the axes of the logs."),
+        typer.Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
     ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.

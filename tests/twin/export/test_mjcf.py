@@ -55,6 +55,9 @@ DRIVEN = """<mujoco model="slide">
   <actuator><!-- of the drive --><dcmotor name="m" joint="x" gear="4"
     motorconst="1e-4 1e-4" resistance="1"/></actuator>
 </mujoco>"""
+TENDON = '<tendon><fixed name="x"><joint joint="q" coef="1"/></fixed></tendon>'
+OF_TENDON = DRIVEN.replace('joint name="x"', 'joint name="q"').replace('joint="x"', 'tendon="x"')
+OF_TENDON = OF_TENDON.replace("<actuator>", f"{TENDON}<actuator>")
 BRISTLES = {"Fc": 3.0, "Fs": 5.0, "v0": 0.01, "sigma0": 1000.0, "sigma1": 2.0, "sigma2": 7.0}
 
 
@@ -69,10 +72,12 @@ def dragged(text: str, speed: float) -> np.ndarray:
     return np.array(force)
 
 
-@pytest.mark.parametrize("speed", [0.002, 0.01, -0.05])
-def test_a_dc_motor_holds_lugre_friction_as_it_is(speed):
+@pytest.mark.parametrize(
+    ("speed", "driven"), [(0.002, DRIVEN), (0.01, DRIVEN), (-0.05, DRIVEN), (0.01, OF_TENDON)]
+)
+def test_a_dc_motor_holds_lugre_friction_as_it_is(speed, driven):
     axis = AxisModel(1.0, effects=(fitted("lugre", **BRISTLES),), mass_fixed=True)
-    made = export(MachineModel("slide", {"x": axis}, 1000.0, DRIVEN, "slide.xml"), {})
+    made = export(MachineModel("slide", {"x": axis}, 1000.0, driven, "slide.xml"), {})
     text = made.files["slide.xml"]
     assert isinstance(text, str)
     assert (made.kept["x"], made.approximated, made.lost) == (("lugre",), (), ())

@@ -42,6 +42,14 @@ TRANSMISSIONS = {
         TIED, {"base": "base", "up": "shoulder"}, [[1, 0], [0, 1], [0, -1.5]], [0, 0, 0.2],
     ),
     "tendons of two joints": (COUPLED, MOTORS, np.linalg.inv(SUMS), 0.0),
+    "tied tendons": (
+        COUPLED.replace(
+            "<tendon>",
+            '<equality><tendon tendon1="belt" tendon2="lift" polycoef="0.1 2"/></equality><tendon>',
+        ),
+        {"base": "base", "lift": "lift"}, np.linalg.inv(SUMS) @ [[1, 0], [0, 1], [0, 2]],
+        np.linalg.inv(SUMS) @ [0, 0, 0.1],
+    ),
     "a tendon of tied joints": (
         GRIPPER, {"base": "base", "grip": "both"}, [[1, 0], [0, -1 / 3], [0, 0.5]],
         [0, 0.2 / 1.5, 0],
