@@ -300,6 +300,9 @@ def is_constant(axis: AxisModel, c: ParameterReference) -> bool:
     return own.effect.is_nonparametric or (alone and not sensed)
 
 
+NOWHERE = b"no place yet"  # where nothing is free, a place has no bytes
+
+
 class FitProblem:
     """Residual and Jacobian of one fit in internal variables, with priors as extra rows.
 
@@ -331,8 +334,8 @@ class FitProblem:
         self.smooth = smoothing(axis, self.scaling.where, int(self.kept.sum()))
         linear = np.array([is_constant(axis, c) for c in self.scaling.where], dtype=bool)
         self.bent = ~(linear & self.scaling.is_itself())
-        self._slopes, self._place = self._constant_slopes(), b""
-        self._last_force: tuple[bytes, Array] = b"", np.zeros(0)
+        self._slopes, self._place = self._constant_slopes(), NOWHERE
+        self._last_force = NOWHERE, np.zeros(0)
 
     def set_priors(self, internal: Array, left: Array) -> float:
         """Weigh the priors by the size of an error, its colour, and the force to be explained.

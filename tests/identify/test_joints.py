@@ -78,6 +78,14 @@ def test_planted_friction_is_found(folder):
         assert found.datasets[joint].channel_delay == 0.0
 
 
+def test_of_joints_without_effects_nothing_is_free_and_what_is_left_is_told(folder):
+    model = load_model(folder / "arm.toml")
+    for joint in JOINTS:
+        model = model.with_axis(joint, replace(model.axes[joint], effects=()))
+    found = fit(model, folder / "1.mcap")
+    assert all(one.ratio > 10.0 for one in found.fits.values())
+
+
 TIED = ARM.replace(
     "</mujoco>",
     '<equality><joint joint1="elbow" joint2="shoulder" polycoef="0.2 -1.5" solref="0.002 1"/>'
