@@ -44,13 +44,15 @@ class Taken:
 
     t: logarithmic gain over blocks, over its standard error. whole, typical: part of what is left
     above the noise floor, of all of it and of that of a typical block, at most 1. apart: the mean
-    square of what the two models foretell differently, over that of what is left.
+    square of what the two models foretell differently, over that of what is left. told: the same
+    over the noise, times the effective samples: twice the evidence that there can be between them.
     """
 
     t: float
     whole: float
     typical: float
     apart: float = 1.0
+    told: float = np.inf
 
     @property
     def part(self) -> float:
@@ -196,14 +198,15 @@ def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -
 def prefers(one: Judged, other: Judged) -> bool:
     """Whether the logs clearly prefer one model to another, where both explain them.
 
-    Logs for which the two foretell the same force, or nearly, say nothing of it. All others have
-    to agree; and where more than noise is left, which one of the two may take by chance, on a
-    difference that matters.
+    Logs for which the two foretell the same force, or nearly, say nothing of it: at the noise
+    floor, where they differ by less than noise lets tell. All others have to agree; and where more
+    than noise is left, which one of the two may take by chance, on a difference that matters.
     """
     by = score(other, one)
     groups = (by.training, by.other)
     if one.at_floor:
-        sure = max(g.t for g in groups) >= RULE.least_bic**0.5
+        least = RULE.least_bic**0.5
+        sure = any(g.told >= RULE.least_bic and g.t >= least for g in groups)
         return sure and min(g.t for g in groups) > -least_t(1)
     telling = [g for g in groups if g.apart >= RULE.least_part]
     clear = (g.t >= least_t(1) and g.part >= RULE.least_part for g in telling)
@@ -225,10 +228,10 @@ def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Tak
     gains = np.log((squares[0] + quiet) / (squares[1] + quiet))
     spread = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     t = (gains.mean() - charge) / spread if spread > 0.0 else 0.0
-    apart = np.mean((before - after)[both] ** 2) / _left(
-        np.average(squares[0], weights=count), quiet
-    )
-    return Taken(float(t), *parts(squares[0], squares[1], count, quiet), float(apart))
+    difference = float(np.mean((before - after)[both] ** 2))
+    apart = difference / _left(float(np.average(squares[0], weights=count)), quiet)
+    told = effective_samples(after[both]) * difference / max(quiet, TINY)
+    return Taken(float(t), *parts(squares[0], squares[1], count, quiet), apart, told)
 
 
 def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[float, float]:

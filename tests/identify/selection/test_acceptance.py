@@ -72,6 +72,15 @@ def test_residuals_that_tell_nothing_of_each_other_are_left_out() -> None:
     assert taken(before, np.full(SAMPLES, np.nan), FLOOR) == Taken(0.0, 0.0, 0.0, 0.0)
 
 
+def test_a_difference_below_what_noise_lets_tell_is_none_however_sure_its_sign() -> None:
+    """A fit ends a thousandth of a noise short of another, alike in every block."""
+    noise = np.random.default_rng(6).normal(0.0, FLOOR, SAMPLES)
+    found = taken(1.001 * noise, noise, FLOOR)
+    assert found.t > 10.0
+    assert found.told < 0.1
+    assert taken(1.5 * noise, noise, FLOOR).told > 100.0
+
+
 @pytest.mark.parametrize("factor", [0.01, 100.0])
 def test_the_unit_of_force_changes_nothing(factor: float) -> None:
     before, after = noise(2.0), noise(1.2, 2)
