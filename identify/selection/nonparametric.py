@@ -56,13 +56,15 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:
     """Fit a free curve in the place of a law, or beside it, see ``Shape.beside``."""
     axis = base.axis if shape.beside else base.axis.without(shape.effect)
-    first = _attempt(_as_it_is(base, axis, dataset), dataset, shape.empty)
-    if first.fit.at_floor:
-        return first.fit
-    # The law's own shape had distorted the other values, so choose again beside the refit.
-    again = first.fit.axis.without(shape.empty.effect.name)
-    second = _attempt(_as_it_is(base, again, dataset), dataset, shape.empty)
-    return min(first, second, key=lambda c: c.fit.error).fit
+    best = _attempt(_as_it_is(base, axis, dataset), dataset, shape.empty).fit
+    if not best.at_floor:
+        # The law's own shape had distorted the other values, so choose again beside the refit.
+        again = best.axis.without(shape.empty.effect.name)
+        second = _attempt(_as_it_is(base, again, dataset), dataset, shape.empty).fit
+        best = min(best, second, key=lambda fit: fit.error)
+    return replace(
+        best, begun=base.begun
+    )  # whose law is not absent, though a curve is in its place
 
 
 def _as_it_is(base: Fit, axis: AxisModel, dataset: Dataset) -> Fit:
