@@ -44,15 +44,13 @@ class Taken:
 
     t: logarithmic gain over blocks, over its standard error. whole, typical: part of what is left
     above the noise floor, of all of it and of that of a typical block, at most 1. apart: the mean
-    square of what the two models foretell differently, over that of what is left. told: the same
-    over the noise, times the effective samples: twice the evidence that there can be between them.
+    square of what the two models foretell differently, over that of what is left.
     """
 
     t: float
     whole: float
     typical: float
     apart: float = 1.0
-    told: float = np.inf
 
     @property
     def part(self) -> float:
@@ -205,8 +203,12 @@ def prefers(one: Judged, other: Judged) -> bool:
     by = score(other, one)
     groups = (by.training, by.other)
     if one.at_floor:
-        least = RULE.least_bic**0.5
-        sure = any(g.told >= RULE.least_bic and g.t >= least for g in groups)
+        most = (
+            most_evidence(other.training, one.training, other.fit.floor),
+            most_evidence(other.other, one.other, other.other_floor),
+        )
+        least = RULE.least_bic
+        sure = any(g.t >= least**0.5 and e >= least for g, e in zip(groups, most, strict=True))
         return sure and min(g.t for g in groups) > -least_t(1)
     telling = [g for g in groups if g.apart >= RULE.least_part]
     clear = (g.t >= least_t(1) and g.part >= RULE.least_part for g in telling)
@@ -228,10 +230,21 @@ def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Tak
     gains = np.log((squares[0] + quiet) / (squares[1] + quiet))
     spread = gains.std(ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     t = (gains.mean() - charge) / spread if spread > 0.0 else 0.0
-    difference = float(np.mean((before - after)[both] ** 2))
-    apart = difference / _left(float(np.average(squares[0], weights=count)), quiet)
-    told = effective_samples(after[both]) * difference / max(quiet, TINY)
-    return Taken(float(t), *parts(squares[0], squares[1], count, quiet), apart, told)
+    left = _left(float(np.average(squares[0], weights=count)), quiet)
+    apart = float(np.mean((before - after)[both] ** 2)) / left
+    return Taken(float(t), *parts(squares[0], squares[1], count, quiet), apart)
+
+
+def most_evidence(before: Array, after: Array, floor: float) -> float:
+    """Twice the most log likelihood that there can be between two models of residuals (n,) N.
+
+    By how far apart they foretell the force, in units of the noise floor (N RMS).
+    """
+    both = np.isfinite(before) & np.isfinite(after)
+    if not both.any():
+        return 0.0
+    apart = float(np.mean((before - after)[both] ** 2))
+    return effective_samples(after[both]) * apart / max(floor**2, TINY)
 
 
 def parts(before: Array, after: Array, count: Array, quiet: float) -> tuple[float, float]:

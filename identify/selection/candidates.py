@@ -26,7 +26,7 @@ from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
-from identify.selection.acceptance import TINY, Judged, Score, Taken, score
+from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel
 
@@ -156,7 +156,11 @@ def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
     """Whether most of a force in time is told by where the axis is, how fast, and how it turns."""
     force = averaged_force(alone, dataset.fit)
     where = gathered(dataset.fit)
-    columns = np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)])
+    return _is_of(force, np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)]))
+
+
+def _is_of(force: Array, columns: Array) -> bool:
+    """Whether most of a force (n,) N is in the span of some columns (n, k)."""
     left = unabsorbed(force, orthonormal(columns))
     return float(left @ left) < SAME_FORCE * float(force @ force)
 
@@ -175,8 +179,7 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
     if not load.any():
         return False
     part = float(load @ force) / float(load @ load)
-    left = force - part * load
-    return abs(part) < accuracy and float(left @ left) < SAME_FORCE * float(force @ force)
+    return abs(part) < accuracy and _is_of(force, load[:, None])
 
 
 def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
@@ -190,11 +193,8 @@ def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
         return False
     axes = (replace(alone, effects=(law,)) for law in laws if law)
     now, was, begun, own = (averaged_force(axis, before.dataset.fit) for axis in axes)
-    gone = was - now
-    left = gone - own * float(gone @ own) / max(float(own @ own), TINY)
     least = min(float(was @ was), float(begun @ begun))
-    collapsed = float(now @ now) < RULE.collapse**2 * least
-    return collapsed and float(left @ left) < SAME_FORCE * float(gone @ gone)
+    return float(now @ now) < RULE.collapse**2 * least and _is_of(was - now, own[:, None])
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:

@@ -10,7 +10,16 @@ from built_fits import axis_of, built_fit, dataset_stub, fitted
 from linear_cases import cut
 
 from identify.estimation.evidence import BLOCKS
-from identify.selection.acceptance import Judged, Score, Taken, least_t, parts, score, taken
+from identify.selection.acceptance import (
+    Judged,
+    Score,
+    Taken,
+    least_t,
+    most_evidence,
+    parts,
+    score,
+    taken,
+)
 from twin.model.parameters import free_parameters
 
 SAMPLES = 1200
@@ -75,10 +84,9 @@ def test_residuals_that_tell_nothing_of_each_other_are_left_out() -> None:
 def test_a_difference_below_what_noise_lets_tell_is_none_however_sure_its_sign() -> None:
     """A fit ends a thousandth of a noise short of another, alike in every block."""
     noise = np.random.default_rng(6).normal(0.0, FLOOR, SAMPLES)
-    found = taken(1.001 * noise, noise, FLOOR)
-    assert found.t > 10.0
-    assert found.told < 0.1
-    assert taken(1.5 * noise, noise, FLOOR).told > 100.0
+    assert taken(1.001 * noise, noise, FLOOR).t > 10.0
+    assert most_evidence(1.001 * noise, noise, FLOOR) < 0.1
+    assert most_evidence(1.5 * noise, noise, FLOOR) > 100.0
 
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
