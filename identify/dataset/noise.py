@@ -16,8 +16,8 @@ that the residual holds -e (g (1 - 1/n) - m w^2), and between its two terms the 
 no independent noises make. The coherence of the two is sqrt(1 - 1/n), whatever machine and
 controller, and folded is the same fraction of the command's power near the log's Nyquist frequency.
 Where the log has the control rate the axis moves by just what was logged, and there is no dip. The
-rounding of readings at even speed can make one; but then the readings that were logged tell the
-whole command.
+rounding of readings at even speed can make one; but what is folded is white, and so no frequency
+below the band is quieter.
 """
 
 from __future__ import annotations
@@ -115,6 +115,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     if force < most:
         force = motion.command_noise
     more, scatter = _folded(motion, frequency[band], power[band], half[band], bend[band])
+    # 2 bins that hold the slow motion; a dip leaves a quarter of what is folded, rounding a 20th
+    if float((power / half)[2 : np.flatnonzero(band)[0]].min(initial=np.inf)) < 0.1 * more:
+        more = scatter = 0.0
     return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
 
 
@@ -153,10 +156,6 @@ def _folded(
         return 0.0, 0.0
     each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
     folded = max(coherence**2, 0.5) * float(each.mean())  # half, where every other is left out
-    shown = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
-    untold = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
-    if level <= shown * float(np.median(each)) or motion.command_noise <= untold * folded:
-        return 0.0, 0.0
     return folded, float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
 
 
