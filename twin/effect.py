@@ -80,7 +80,7 @@ def own_functions(function: Callable[..., Any]) -> tuple[FunctionType, ...]:
 
 
 class Kind(Enum):
-    """What a law acts on; the values give the order of computation within a sample."""
+    """What a law acts on; the values give the order of computation within a sample (`turn`)."""
 
     SENSING = 0
     ACTUATION = 1
@@ -271,6 +271,18 @@ class Effect:
     def reads(self, slot: str) -> bool:
         """Whether the law, or a function that it calls, names that slot of ``io``, such as "U"."""
         return slot in self._names
+
+    @property
+    def turn(self) -> tuple[int, int]:
+        """When a law's turn is within a sample; effects of an equal one keep the model's order.
+
+        By kind. Of those that make a reading, first what remembers: a delay is of the smooth
+        position, of which samples tell what was between them. Rounding is last.
+        """
+        if self.kind is not Kind.SENSING:
+            return self.kind.value, 0
+        rounds = all(p.fixed for p in self.parameters)
+        return self.kind.value, 0 if self.states else 2 if rounds else 1
 
     @property
     def reads_other_axis(self) -> bool:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Collection, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -51,8 +52,9 @@ DURATION = 12.0  # s of tracking
 MOVES = 8  # places of a log of fastest moves
 TRAINING = 2  # logs, of tracking and of moves; one more of each is for selection and for the test
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
-ROUNDS = 2  # corrections of a friction's level
-LEVELS = (0.1, 10.0)  # times the machine's own friction, within which the level is sought
+ROUNDS = 2  # corrections of the level of a friction or a noise
+LEVELS = (0.1, 10.0)  # times what it is drawn at, within which the level is sought
+FARTHER = 3.0  # times a rounding's step at most, of one try to the next
 OWN = 0.999  # of an effect's force, absorbed by a fit, from which the model has it by itself
 Run = tuple[Experiment, int]  # what is commanded, and the seed of its log
 REACHED = 0.7  # part of the wanted force that an effect must reach within its bounds
@@ -175,9 +177,14 @@ def machine(
     seeds = rng.integers(1, 1 << 31, size=len(experiments))
     runs = [(e, int(seed)) for e, seed in zip(experiments, seeds, strict=True)]
     planted: list[Fitted] = []
-    # Friction first, as its level is found with a model that lacks nothing else.
-    for effect in sorted(effects, key=lambda e: e.kind is not Kind.FRICTION):
-        put = _with_friction if effect.kind is Kind.FRICTION else _with_planted
+    # Noise first, as it is a part of the floor; then friction, as its level is found with a model
+    # that lacks nothing else.
+    ways = (
+        (_with_noise, [e for e in effects if is_noise(e)]),
+        (_with_friction, [e for e in effects if e.kind is Kind.FRICTION]),
+        (_with_planted, [e for e in effects if not is_noise(e) and e.kind is not Kind.FRICTION]),
+    )
+    for put, effect in ((put, e) for put, some in ways for e in some):
         drawn, fitted = put(drawn, effect, strength, runs[:TRAINING], rng)
         planted.append(fitted)
     held = drawn.model.axes[AXIS].mass_fixed
@@ -305,14 +312,43 @@ def _with_friction(
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
 
-    drawn_at, scale = fitted, 1.0
-    for _ in range(ROUNDS):
-        scale = float(np.clip(scale * strength / left(fitted), *LEVELS))
-        scaled = {p.name: scale * drawn_at.values[p.name] for p in effect.strengths}
-        fitted = Fitted.at_start(effect, {**drawn_at.values, **scaled})
-    if left(fitted) < REACHED * strength:
-        raise NotShown(effect.name)
+    fitted = _levelled(fitted, left, strength)
     return having(fitted), fitted
+
+
+def _with_noise(
+    drawn: Drawn, effect: Effect, strength: float, runs: Sequence[Run], rng: np.random.Generator
+) -> tuple[Drawn, Fitted]:
+    """A machine whose readings are rounded, until its own laws leave that strength of it.
+
+    The noise that they have dithers their rounding, and where the axis rests between two steps it
+    hunts or not by chance, so that only logs with it tell what it adds.
+    """
+    plain = _Trial.of(drawn, runs)
+    white = np.sqrt(12.0) * drawn.true.axes[AXIS].hardware.encoder_noise  # of as much rounding
+    step, wanted = strength * white, (REACHED * strength, strength / REACHED)
+    for _ in range(TRIES):
+        (name,) = (p.name for p in effect.strengths)
+        fitted = Fitted.at_start(effect, {name: float(step)})
+        noisy = drawn.on(AXIS, partial(AxisModel.with_effect, new=fitted))
+        more = (_Trial.of(noisy, runs).floor / plain.floor) ** 2 - 1.0
+        added = float(np.sqrt(max(more, 0.0)))
+        if wanted[0] <= added <= wanted[1]:
+            return noisy, fitted
+        step *= float(np.clip(strength / max(added, 1e-3), 1.0 / FARTHER, FARTHER))
+    raise NotShown(effect.name)
+
+
+def _levelled(begun: Fitted, size: Callable[[Fitted], float], strength: float) -> Fitted:
+    """An effect whose strengths are scaled until its size is that strength. Raises NotShown."""
+    fitted, scale = begun, 1.0
+    for _ in range(ROUNDS):
+        scale = float(np.clip(scale * strength / size(fitted), *LEVELS))
+        scaled = {p.name: scale * begun.values[p.name] for p in begun.effect.strengths}
+        fitted = Fitted.at_start(begun.effect, {**begun.values, **scaled})
+    if size(fitted) < REACHED * strength:
+        raise NotShown(begun.effect.name)
+    return fitted
 
 
 def _with_planted(

@@ -270,7 +270,7 @@ def build_table(
         n_states += 4  # of the axis itself, before those of its effects
         begin = len(rows)
         sensing = begin
-        for effect, values in sorted(effects, key=lambda e: e[0].kind.value):
+        for effect, values in sorted(effects, key=lambda e: e[0].turn):
             rows.append((law_address(effect), effect.kind.value, len(parameters), n_states))
             labels.append((axis, effect.name))
             parameters.extend(values)

@@ -157,8 +157,8 @@ def test_rounding_is_not_taken_for_noise_of_the_force():
     assert found.most >= 3.0 * white_rounding(5e-7, 1e-4)
 
 
-def test_rounding_at_even_speed_is_no_aliasing_where_the_readings_tell_the_command():
-    """A tone of rounding beside another looks like the dip of a thinned log."""
+def test_rounding_at_even_speed_is_no_aliasing():
+    """A tone of rounding beside another looks like the dip of a thinned log; below it is quiet."""
     stage = one_axis(load_model("proton_xy", CATALOGUE))
     axis = stage.axes["x"]
     quiet = replace(axis.hardware, current_noise=1e-5, encoder_noise=1e-10)

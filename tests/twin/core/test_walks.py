@@ -105,3 +105,25 @@ def test_columns_times_strengths_are_the_law(effect: Effect, laid: dict[str, flo
 
 def test_some_force_and_some_sensing_effect_have_columns() -> None:
     assert {e.kind for e in COLUMNS} >= {Kind.FORCE, Kind.SENSING}
+
+
+def test_a_reading_is_delayed_then_rippled_then_rounded_in_whatever_order_they_are_given() -> None:
+    """A ripple that is far shorter than a sample's way, delayed by half a sample."""
+    period, step, ripple = 1e-5, 1e-8, 1e-7  # m
+    given = (
+        Fitted.at_start(CATALOGUE["encoder_quantization"], {"step": step}),
+        Fitted.at_start(CATALOGUE["encoder_ripple"], {"period": period, "a1": ripple}),
+        Fitted.at_start(CATALOGUE["encoder_delay"], {"tau": 0.5 * PERIOD}),
+    )
+    x = 0.1 * PERIOD * np.arange(N) + 1.3e-6  # m, ten periods of the ripple a sample
+    delayed = x - 0.05 * PERIOD
+    asked = delayed + ripple * np.sin(2.0 * np.pi * delayed / period)
+    for effects in (given, given[::-1]):
+        table, reading = axis_table({"": AxisModel(5.0, effects=effects)}), np.empty(N)
+        _, _, _, first, last = table.axes[0]
+        walk_sensing(
+            table.entries, first, last, table.parameters, np.zeros(table.n_states),
+            np.stack([x, np.gradient(x, PERIOD)]), PERIOD, reading,
+        )  # fmt: skip
+        assert reading[5:] / step == pytest.approx(np.rint(reading[5:] / step), abs=1e-4)
+        assert reading[5:] == pytest.approx(asked[5:], abs=0.6 * step)

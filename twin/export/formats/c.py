@@ -138,7 +138,7 @@ def c_source(model: MachineModel) -> CSource:
     for axis_name, axis in model.axes.items():
         found = followed(axis)
         made, left = [], dict(found.lost)
-        for f in sorted(found.axis.effects, key=lambda f: f.effect.kind.value):
+        for f in sorted(found.axis.effects, key=lambda f: f.effect.turn):
             try:
                 CLaws().law(f.effect.law)  # so that half a law is not left among the others
                 made.append(LawCode(f, laws.law(f.effect.law)))
