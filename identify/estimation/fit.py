@@ -194,7 +194,9 @@ def fit_axis(
     return _ended(problem, internal, converged)
 
 
-def fit_roughly(axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int) -> Fit:
+def fit_roughly(
+    axis: AxisModel, logs: Sequence[PreparedLog], most_evaluations: int = MOST_EVALUATIONS
+) -> Fit:
     """Fit the free parameters until the squared error falls by less than a thousandth."""
     return _ended(*_begun(axis, logs, most_evaluations), converged=False)
 

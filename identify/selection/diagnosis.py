@@ -7,7 +7,7 @@ from enum import Enum
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Errors, Fit, finished, fit_axis
+from identify.estimation.fit import Errors, Fit, finished, fit_axis, fit_roughly
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
@@ -18,7 +18,7 @@ from identify.selection.search import Found, Step, is_level, search
 from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
-from twin.model.machine import Fitted
+from twin.model.machine import AxisModel, Fitted
 from twin.parallel import Progress, silent
 
 ALIKE = (Kind.FRICTION, Kind.STRUCTURE)  # whose values of one name mean the same in each
@@ -202,12 +202,20 @@ def _compared_again(step: Step, found: Found) -> Step:
         laws = [law] if rival.candidate.score else []
         if law.effect.kind in ALIKE:  # whose values were those of another model
             laws.append(_as_free_as(final.fit.axis[step.change.name], law))
-        fits = (fit_axis(axis.with_effect(each), found.dataset.fit) for each in laws)
-        fit = min(fits, key=lambda f: f.error)
-        return is_level(replace(rival, judged=Judged(fit, found.dataset)), own)
+        return any(_is_level_as(axis.with_effect(each), rival, own, found.dataset) for each in laws)
 
     rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.level)}
     return replace(step, level=tuple(t for t in rivals.values() if beside(t)))
+
+
+def _is_level_as(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) -> bool:
+    """Whether a rival is level with what was found, as this axis begins its fit."""
+
+    def is_level_by(fit: Fit) -> bool:
+        return is_level(replace(rival, judged=Judged(fit, dataset)), own)
+
+    rough = fit_roughly(axis, dataset.fit)  # a better fit is no less level
+    return is_level_by(rough) or is_level_by(fit_axis(rough.axis, dataset.fit))
 
 
 def _others_alike(step: Step, found: Found) -> list[Tried]:
