@@ -186,6 +186,8 @@ def _rounding_variance(log: PreparedLog, sticks: bool, segment: int, own: float)
     """
     if log.motion.resolution == 0.0:
         return 0.0
+    if _kept(1, own / log.motion.resolution**2) < RULE.line_chance:  # white noise, and no tones
+        return _white(log, *_gain(log, segment))
     known = _PARTS.setdefault(log, {})  # a property of the log alone, which every fit asks for
     if (sticks, segment) not in known:
         known[sticks, segment] = _parts(log, sticks, segment)
@@ -200,15 +202,27 @@ def _parts(log: PreparedLog, sticks: bool, segment: int) -> tuple[float, float]:
     """
     motion = log.motion
     dt, kept = motion.sample_period, moving([log], sticks)
-    frequency: Array = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
-    gain = rate_gain(frequency, dt) ** 2 * log.test_function.response(dt, segment)
-    white = motion.resolution**2 / 12.0 * 2.0 * dt * float(np.trapezoid(gain, frequency))
+    frequency, gain = _gain(log, segment)
+    white = _white(log, frequency, gain)
     still = np.abs(motion.raw[0]) * dt < 0.5 * motion.resolution
     told = log.fine.acceleration(between(motion.rounding, dt)) ** 2
     told -= white * log.fine.mean(still.astype(float))
     hidden = white + log.fine.mean(_tones(log, white, frequency, gain))
     counted = kept if kept.any() else ~kept
     return float(told[counted].mean()), float(hidden[counted].mean())
+
+
+def _gain(log: PreparedLog, segment: int) -> tuple[Array, Array]:
+    """Frequencies (k,) Hz of a segment, and the power gain from a reading to an acceleration."""
+    dt = log.motion.sample_period
+    frequency: Array = np.asarray(np.fft.rfftfreq(segment, dt), dtype=float)
+    return frequency, rate_gain(frequency, dt) ** 2 * log.test_function.response(dt, segment)
+
+
+def _white(log: PreparedLog, frequency: Array, gain: Array) -> float:
+    """Mean square, (m/s^2)^2, of rounding that is white; frequency, gain: (k,) Hz and 1/s^4."""
+    white = white_rounding(log.motion.resolution, log.motion.sample_period)
+    return float(np.trapezoid(white * gain, frequency))
 
 
 def _uneven(log: PreparedLog) -> tuple[Array, Array]:

@@ -101,6 +101,13 @@ class Clock:
         """A column (rows of the file,) on the even clock, by straight lines."""
         return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
 
+    @property
+    def leaves_all(self) -> bool:
+        """Whether the even clock has each row that it spans where it was, and none was left out."""
+        places = np.interp(self.grid, self.times, np.arange(float(len(self.times))))
+        near = 1e-6  # of a step, that a time in s has lost by rounding
+        return not self.dropped and bool(np.all(np.abs(places - np.rint(places)) < near))
+
     def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
         """What was resampled, and the RMS error of the straight lines in each signal of a map."""
         steps, each = np.diff(self.times) * 1e3, []
@@ -180,7 +187,8 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
         with at(f"column '{mapping.time.name}'"):
             clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
         even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
-        facts["resampled"] = clock.costs(mapping, columns)
+        if not clock.leaves_all:
+            facts["resampled"] = clock.costs(mapping, columns)
         return _log(mapping, even, mapping.resample, facts)
 
 
@@ -213,7 +221,8 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     even: dict[str, Array] = {}
     for number, (own, columns, clock) in enumerate(clocks, 1):
         shared = replace(clock, grid=grid)
-        facts[f"resampled_{number}"] = shared.costs(own, columns)
+        if not shared.leaves_all:
+            facts[f"resampled_{number}"] = shared.costs(own, columns)
         even |= {c.key: shared.resampled(columns[c.name]) for c in own.columns()}
     if is_calendar(float(grid[0])):
         facts["start_time_unix_ns"] = str(round(float(grid[0]) * 1e9))
