@@ -101,7 +101,23 @@ class Commands(typer.Typer):
 
 
 class Command(TyperCommand):
-    """A command that overwrites no file that it reads, and no output with another."""
+    """A command that overwrites no file that it reads, and no output with another.
+
+    Options that may be repeated take all that follows them up to the next option: of two logs
+    behind ``--holdout`` the second would else be fitted on, without a word.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        repeated = {o for p in self.params if getattr(p, "multiple", False) for o in p.opts}
+        spread: list[str] = []
+        option, count = "", 0
+        for arg in args:
+            if arg.startswith("-"):
+                option, count = arg if arg in repeated else "", 0
+            elif option and (count := count + 1) > 1:
+                spread.append(option)
+            spread.append(arg)
+        return super().parse_args(ctx, spread)
 
     def invoke(self, ctx: Any) -> Any:
         outputs, inputs = {}, {}

@@ -37,15 +37,15 @@ ModelOption = Annotated[str, typer.Option("--model", help="Machine model (.toml)
 Holdout = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Selection log (MCAP): no parameter is fitted on it, but it takes part in the choice "
-        "of effects; may be repeated.",
+        help="Selection logs (MCAP), one or several: no parameter is fitted on them, but they take "
+        "part in the choice of effects.",
     ),
 ]
 Test = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Test log (MCAP), on which nothing is decided: it gives the error that is reported; "
-        "may be repeated.",
+        help="Test logs (MCAP), one or several, on which nothing is decided: they give the error "
+        "that is reported.",
     ),
 ]
 TestFunction = Annotated[
@@ -60,7 +60,7 @@ Report = Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")
 Effects = Annotated[
     list[Path] | None,
     typer.Option(
-        "--effects", help="Your own effect file; loading it runs its code. May be repeated."
+        "--effects", help="Your own effect files, one or several; loading them runs their code."
     ),
 ]
 

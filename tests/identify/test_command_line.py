@@ -146,6 +146,8 @@ def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
     [
         ("fit m a -o a", "-o a: is the file that is read as LOG"),
         ("fit m b --holdout a -o link", "-o link: is the file that is read as --holdout"),
+        ("fit m b --holdout c a -o link", "-o link: is the file that is read as --holdout"),
+        ("diagnose m b --holdout c --test d a -o hard", "is the file that is read as --test"),
         ("compare m a --mcap ./a", "--mcap a: is the file that is read as LOG"),
         ("compare m b -o n.html --mcap n.html", "are one file; give two names"),
         ("import b --map a -o link", "read as --map"),

@@ -103,10 +103,11 @@ class Clock:
 
     @property
     def leaves_all(self) -> bool:
-        """Whether the even clock has each row that it spans where it was, and none was left out."""
+        """Whether the even clock has every row that it spans where it was."""
         places = np.interp(self.grid, self.times, np.arange(float(len(self.times))))
         near = 1e-6  # of a step, that a time in s has lost by rounding
-        return not self.dropped and bool(np.all(np.abs(places - np.rint(places)) < near))
+        each = np.rint(places[:1]) + np.arange(len(places))  # row after row
+        return not self.dropped and bool(np.all(np.abs(places - each) < near))
 
     def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
         """What was resampled, and the RMS error of the straight lines in each signal of a map."""

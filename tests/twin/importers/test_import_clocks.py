@@ -155,6 +155,7 @@ def test_files_of_one_rate_need_no_clock(tmp_path):
     both = mapping(tmp_path, rates + TWO[TWO.index("[axes.x]") :])
     log = import_log([tmp_path / "a.csv", tmp_path / "b.csv"], both)
     assert log.sample_rate == 500.0
+    assert not any(name.startswith("resampled") for name in log.metadata)
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * columns[0], rtol=1e-12)
     np.testing.assert_allclose(log.axes["x"].force, columns[1], rtol=1e-12)
 
