@@ -310,16 +310,20 @@ def _first_axis(
         acceleration=_shown(reached),
         jerk=_shown(reached / test_function),
     )
-    effects = _first_effects(found, catalogue, covered, units)
+    effects = _first_effects(found, catalogue, covered, units, joint is not None)
     if joint is not None:
         return replace(joint, hardware=hardware, effects=effects)
     return AxisModel(_shown(found.mass or 0.0), hardware, effects, rotary=units.rotary)
 
 
 def _first_effects(
-    found: FirstValues, catalogue: Catalogue, covered: Excitation, units: AxisUnits
+    found: FirstValues, catalogue: Catalogue, covered: Excitation, units: AxisUnits, is_joint: bool
 ) -> tuple[Fitted, ...]:
-    """The simplest friction, and a constant force where there is one, with what was found."""
+    """The simplest friction, and a constant force where there is one, with what was found.
+
+    Of a joint always: its current has an offset, and what the bodies weigh is not known well (M.
+    Gautier, A. Janot, P.-O. Vandanjon, IEEE Trans. Control Systems Technology 21 (2013), 428-444).
+    """
     known = [e for e in catalogue.values() if not e.is_nonparametric]
     frictions = (e for e in known if e.kind is Kind.FRICTION)
     friction = min(frictions, key=lambda e: (len(e.parameters), len(e.states)))
@@ -327,7 +331,8 @@ def _first_effects(
     values = {"Fc": found.coulomb, "Fs": static, "sigma2": found.viscous}
     own = {n: _shown(v) for n, v in values.items() if n in friction.starts(covered)}
     effects = [Fitted.at_start(friction, {**friction.starts(covered), **own}, units)]
-    for force in (e for e in known if e.kind is Kind.FORCE and not e.states and found.constant):
+    constant = is_joint or found.constant
+    for force in (e for e in known if e.kind is Kind.FORCE and not e.states and constant):
         if [p.unit for p in force.parameters] == ["N"]:
             level = {force.parameters[0].name: _shown(-found.constant)}
             effects.append(Fitted.at_start(force, level, units))

@@ -51,7 +51,8 @@ from twin.simulator import MujocoSimulator
 
 RIVALS = ("gravity", "spring")
 LOCAL = "position_dependent_friction"
-FEW = Catalogue([load_catalogue()[n] for n in ("coulomb_viscous", "rotor_inertia", "gravity")])
+FEW_NAMES = ("coulomb_viscous", "constant_force", "rotor_inertia", "gravity")
+FEW = Catalogue([load_catalogue()[n] for n in FEW_NAMES])
 NEW = ("new", "1.mcap", "--mjcf", "arm.xml", "-o", "arm.toml")
 
 
@@ -74,6 +75,8 @@ def test_planted_friction_is_found(folder):
         values = found.fits[joint].axis["coulomb_viscous"].values
         assert values["Fc"] == pytest.approx(coulomb, rel=0.02)
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
+        # the offset of each joint, of which this arm has none
+        assert abs(found.fits[joint].axis["constant_force"].values["F0"]) < 0.02 * coulomb
         assert found.fits[joint].ratio < 1.5
         assert found.datasets[joint].channel_delay == 0.0
 
