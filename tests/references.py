@@ -276,6 +276,13 @@ def load_dependent_friction(p: Values, q: Columns) -> Results:
     return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
 
 
+@written_from("sigma2 -> sigma2 (1 - loss |v|/(vt + |v|))")
+def shear_thinning(p: Values, q: Columns) -> Results:
+    moved = np.abs(q.v) > 0.0
+    high = np.divide(1.0, 1.0 + p["vt"] / np.where(moved, np.abs(q.v), 1.0))
+    return {VISCOUS: q.viscous * (1.0 - p["loss"] * moved * high)}
+
+
 @written_from("Fc, Fs -> Fc, Fs (1 + growth |load|)")
 def joint_load_friction(p: Values, q: Columns) -> Results:
     return {DRY: q.dry + q.dry * np.sqrt((p["growth"] * q.load) ** 2)}

@@ -152,9 +152,9 @@ def _folded(
     level, reading, dip = map(float, fitted_levels(shapes, power))
     coherence = min(0.5 * dip / np.sqrt(level * reading), 1.0) if level * reading else 0.0
     coherent = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
-    if coherence < coherent:
-        return 0.0, 0.0
     each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
+    if coherence < coherent or not each.any():
+        return 0.0, 0.0
     folded = max(coherence**2, 0.5) * float(each.mean())  # half, where every other is left out
     return folded, float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
 

@@ -92,13 +92,13 @@ def differing(effect: Effect, length: float, force: float) -> list[str]:
     """What is another in these units: relative error of the fit, parameters, bounds that hold."""
     here, there = fitted_in(effect, 1.0, 1.0), fitted_in(effect, length, force)
     out = []
-    if abs(there.error / force / here.error - 1.0) > SAME:
-        out.append(f"error {here.error:g} N, {there.error / force:g} N")
     if at_bounds(here, effect.name) != at_bounds(there, effect.name):
         out.append("bounds")
-    back = in_units(there.axis[effect.name], 1.0 / length, 1.0 / force)
     if not IN_METRES.isdisjoint(f"{effect.name}.{p.name}" for p in effect.parameters):
         return out
+    if abs(there.error / force / here.error - 1.0) > SAME:
+        out.append(f"error {here.error:g} N, {there.error / force:g} N")
+    back = in_units(there.axis[effect.name], 1.0 / length, 1.0 / force)
     for p in effect.parameters:
         one, other = here.axis[effect.name].values[p.name], back.values[p.name]
         if abs(one - other) > SAME * max(abs(one), abs(other)):

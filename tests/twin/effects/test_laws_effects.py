@@ -35,6 +35,7 @@ SPECIAL = {
     "position_dependent_friction": {
         "start": -0.11, "length": 0.23, "c1": 0.5, "c2": -0.3, "c3": 0.7, "c4": 0.2, "c5": -0.4,
     },
+    "shear_thinning": {"loss": 0.6, "vt": 0.07},
     "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
     "wear": {"rate": 300.0},
     "free_curve": {"per_metre": 2.9, "offset": -0.375, "turn": 3e-6, "rest": 0.03},
