@@ -152,10 +152,14 @@ def _folded(
     level, reading, dip = map(float, fitted_levels(shapes, power))
     coherence = min(0.5 * dip / np.sqrt(level * reading), 1.0) if level * reading else 0.0
     coherent = 0.6  # least coherence: half of the samples left out make 0.71, chance less than 0.55
-    each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
-    if coherence < coherent or not each.any():
+    if coherence < coherent:
         return 0.0, 0.0
+    each = _near_nyquist(motion, float(frequency[1] - frequency[0]))
     folded = max(coherence**2, 0.5) * float(each.mean())  # half, where every other is left out
+    shown = 0.25  # of the command's power near Nyquist, that the dip must show in the residual
+    untold = 1e-3  # of what is folded, in the command beside what readings made of it; from 0.01
+    if level <= shown * float(np.median(each)) or motion.command_noise <= untold * folded:
+        return 0.0, 0.0
     return folded, float(each.std() / each.mean() / np.sqrt(max(len(each) / 2.0, 1.0)))
 
 
