@@ -20,7 +20,7 @@ from twin.errors import InputError
 # Each is loaded when it runs: some need packages that the others do without.
 MEASURED = (
     "simulation", "starts", "peer_fits", "diagnosis", "passes", "kinds", "stages",
-    "mcap_logs", "effect_cost", "emps", "joints", "withheld", "foreign", "drives", "thesis",
+    "mcap_logs", "effect_cost", "emps", "joints", "withheld", "tx40", "foreign", "drives", "thesis",
     "selftest", "export", "frf", "rule", "fuzz", "mutation", "size",
 )  # fmt: skip
 # What takes options, or half an hour, by its name alone, and the module.
