@@ -22,7 +22,7 @@ from benchmarks.selftest.trial import Answer, TrialResult
 from benchmarks.selftest.words import tell
 from identify.selection.findings import FindingKind, Level, read
 
-LEAST_ANSWERS = 30  # to a level: a rate of them is known to some 10 points
+LEAST_ANSWERS = 100  # to a level: a rate of them is known to some 5 points
 SPLIT = 1  # seed of the halves
 
 
