@@ -30,6 +30,6 @@ EFFECT = Effect(
         ),
     ),
     law=law,
-    fingerprint="residual follows speed at low speed and opposes it at the highest",
+    fingerprint="residual follows the lowest and the highest speeds, and opposes those between",
     excited_by="passes at several constant speeds, from the lowest to the highest",
 )  # fmt: skip
