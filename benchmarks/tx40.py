@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.figures import Figure, Target
+from benchmarks.real_machines import TX40_JOINTS as JOINTS
 from benchmarks.withheld import DATA
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Role
@@ -31,7 +32,6 @@ FOLDER = DATA / "tx40"
 LENGTH = 0.1  # s, of the test functions by which errors are compared
 PART, PARTS = 3000, 13  # rows of a part, and how many
 SELECTION, TEST = (2, 8), (5, 11)
-JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 BY_HAND = (1.36, 1.04, 1.03, 0.615, 0.774, 0.495)  # N m, test errors
 COULOMB = (7.14, 8.26, 6.34, 2.48, 3.03, 0.28)  # N m, the laboratory's
 WRIST = 1.95  # N m, the laboratory's Coulomb friction of the coupled wrist
@@ -81,12 +81,16 @@ def measure() -> list[Figure]:
 def _parts(folder: Path) -> Iterable[Log]:
     """The log of each part, as `twin import` makes it."""
     (folder / "map.toml").write_text(MAP, encoding="utf-8")
-    mapping, paths = load_mapping(folder / "map.toml"), [folder / "q.csv", folder / "u.csv"]
+    mapping = load_mapping(folder / "map.toml")
+    tables = {
+        folder / f"{name}.csv": (FOLDER / f"{name}_data.csv").read_text(encoding="utf-8")
+        for name in ("pos_read", "curr")
+    }
     for first, stop in pairwise(range(0, (PARTS + 1) * PART, PART)):
-        for name, path in zip(("pos_read", "curr"), paths, strict=True):
-            head, *rows = (FOLDER / f"{name}_data.csv").read_text(encoding="utf-8").splitlines()
+        for path, text in tables.items():
+            head, *rows = text.splitlines()
             path.write_text("\n".join([head, *rows[first:stop]]) + "\n", encoding="utf-8")
-        yield import_log(paths, mapping)
+        yield import_log([*tables], mapping)
 
 
 def _named(found: Diagnosis, effect: str, joints: tuple[str, ...]) -> Figure:

@@ -11,7 +11,7 @@ import pytest
 from effect_runs import CATALOGUE
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise, parts_of, reading_error
+from identify.dataset.drive import parts_of, reading_error
 from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
@@ -133,7 +133,7 @@ def _rises(drawn: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
     """Whether an encoder with that effect reads more the farther the axis is, as any does."""
     part = parts_of(axis.with_effect(drawn), Kind.SENSING)
     motion = dataset.fit[0].motion
-    if not part.effects or is_noise(drawn.effect):
+    if not part.effects or drawn.effect.is_noise:
         return True
     _, rate = reading_error(part, motion)
     return rms(rate) < STEEPEST * rms(motion.raw[0])

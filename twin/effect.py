@@ -281,8 +281,12 @@ class Effect:
         """
         if self.kind is not Kind.SENSING:
             return self.kind.value, 0
-        rounds = all(p.fixed for p in self.parameters)
-        return self.kind.value, 0 if self.states else 2 if rounds else 1
+        return self.kind.value, 0 if self.states else 2 if self.is_noise else 1
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it adds only noise to the readings, so that none of it can be fitted."""
+        return self.kind is Kind.SENSING and all(p.fixed for p in self.parameters)
 
     @property
     def reads_other_axis(self) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Collection, Container, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,7 +22,6 @@ from benchmarks.selftest.variations import (
     other_exponents,
 )
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
@@ -52,8 +51,8 @@ DURATION = 12.0  # s of tracking
 MOVES = 8  # places of a log of fastest moves
 TRAINING = 2  # logs, of tracking and of moves; one more of each is for selection and for the test
 HIDDEN = 0.9  # part of an effect's force, absorbed by a fit, from which the mass is held fixed
-ROUNDS = 2  # corrections of the level of a friction or a noise
-LEVELS = (0.1, 10.0)  # times what it is drawn at, within which the level is sought
+ROUNDS = 2  # corrections of a friction's level
+LEVELS = (0.1, 10.0)  # times the machine's own friction, within which the level is sought
 FARTHER = 3.0  # times a rounding's step at most, of one try to the next
 OWN = 0.999  # of an effect's force, absorbed by a fit, from which the model has it by itself
 Run = tuple[Experiment, int]  # what is commanded, and the seed of its log
@@ -179,12 +178,9 @@ def machine(
     planted: list[Fitted] = []
     # Noise first, as it is a part of the floor; then friction, as its level is found with a model
     # that lacks nothing else.
-    ways = (
-        (_with_noise, [e for e in effects if is_noise(e)]),
-        (_with_friction, [e for e in effects if e.kind is Kind.FRICTION]),
-        (_with_planted, [e for e in effects if not is_noise(e) and e.kind is not Kind.FRICTION]),
-    )
-    for put, effect in ((put, e) for put, some in ways for e in some):
+    for effect in sorted(effects, key=lambda e: (not e.is_noise, e.kind is not Kind.FRICTION)):
+        rubs = effect.kind is Kind.FRICTION
+        put = _with_friction if rubs else _with_noise if effect.is_noise else _with_planted
         drawn, fitted = put(drawn, effect, strength, runs[:TRAINING], rng)
         planted.append(fitted)
     held = drawn.model.axes[AXIS].mass_fixed
@@ -209,7 +205,7 @@ def prepared(built: Machine, strength: float) -> Dataset:
     true = built.true.axes[AXIS]
     own = own_error(true, dataset.fit)
     for planted in (f.effect for f in built.planted):
-        if planted.kind is Kind.FRICTION or is_noise(planted):
+        if planted.kind is Kind.FRICTION or planted.is_noise:
             continue
         without = own_error(true.without(planted.name), dataset.fit)
         if without**2 - own**2 < (REACHED * strength * own) ** 2:
@@ -312,7 +308,13 @@ def _with_friction(
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
 
-    fitted = _levelled(fitted, left, strength)
+    drawn_at, scale = fitted, 1.0
+    for _ in range(ROUNDS):
+        scale = float(np.clip(scale * strength / left(fitted), *LEVELS))
+        scaled = {p.name: scale * drawn_at.values[p.name] for p in effect.strengths}
+        fitted = Fitted.at_start(effect, {**drawn_at.values, **scaled})
+    if left(fitted) < REACHED * strength:
+        raise NotShown(effect.name)
     return having(fitted), fitted
 
 
@@ -327,8 +329,8 @@ def _with_noise(
     plain = _Trial.of(drawn, runs)
     white = np.sqrt(12.0) * drawn.true.axes[AXIS].hardware.encoder_noise  # of as much rounding
     step, wanted = strength * white, (REACHED * strength, strength / REACHED)
+    (name,) = (p.name for p in effect.strengths)
     for _ in range(TRIES):
-        (name,) = (p.name for p in effect.strengths)
         fitted = Fitted.at_start(effect, {name: float(step)})
         noisy = drawn.on(AXIS, partial(AxisModel.with_effect, new=fitted))
         more = (_Trial.of(noisy, runs).floor / plain.floor) ** 2 - 1.0
@@ -337,18 +339,6 @@ def _with_noise(
             return noisy, fitted
         step *= float(np.clip(strength / max(added, 1e-3), 1.0 / FARTHER, FARTHER))
     raise NotShown(effect.name)
-
-
-def _levelled(begun: Fitted, size: Callable[[Fitted], float], strength: float) -> Fitted:
-    """An effect whose strengths are scaled until its size is that strength. Raises NotShown."""
-    fitted, scale = begun, 1.0
-    for _ in range(ROUNDS):
-        scale = float(np.clip(scale * strength / size(fitted), *LEVELS))
-        scaled = {p.name: scale * begun.values[p.name] for p in begun.effect.strengths}
-        fitted = Fitted.at_start(begun.effect, {**begun.values, **scaled})
-    if size(fitted) < REACHED * strength:
-        raise NotShown(begun.effect.name)
-    return fitted
 
 
 def _with_planted(

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.selftest.laws import BUMPS, CABLES, NOISE
-from identify.dataset.drive import is_noise
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.effects import load_catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -87,7 +86,7 @@ def encoder(drawn: Drawn, axis: str, rng: np.random.Generator) -> Drawn:
         hardware = replace(a.hardware, encoder_resolution=step, encoder_noise=noise)
         return machine.with_axis(axis, replace(a, hardware=hardware))
 
-    rounding = {e.name for e in load_catalogue().values() if is_noise(e)}
+    rounding = {e.name for e in load_catalogue().values() if e.is_noise}
     return replace(drawn, model=of(drawn.model), true=of(drawn.true), right=drawn.right | rounding)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.motion import SMOOTHED, Blocks, Motion
 from twin.core.walks import walk, walk_sensing
-from twin.effect import Effect, Kind
+from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table
 from twin.signals import between, local_parabola
 
@@ -29,17 +29,12 @@ def parts_of(axis: AxisModel, *kinds: Kind) -> AxisModel:
     return replace(axis, effects=tuple(f for f in axis.effects if f.effect.kind in kinds))
 
 
-def is_noise(effect: Effect) -> bool:
-    """Whether an effect adds only noise to the readings, so that none of it can be fitted."""
-    return effect.kind is Kind.SENSING and all(p.fixed for p in effect.parameters)
-
-
 def knows_rounding(axis: AxisModel, motions: Sequence[Motion]) -> bool:
     """Whether an axis rounds readings as these logs are: by an effect, or by its encoder's step."""
     # 0.9 of the step that logs show, from which an encoder's is that
     step = 0.9 * max(m.resolution for m in motions)
     return axis.hardware.encoder_resolution >= step > 0.0 or any(
-        is_noise(f.effect) for f in axis.effects
+        f.effect.is_noise for f in axis.effects
     )
 
 
@@ -106,7 +101,7 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
 
     The error is sampled at the log's own rate.
     """
-    sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not is_noise(f.effect)]
+    sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not f.effect.is_noise]
     if not sensing:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
     return _behind(_Valued.of(replace(axis, effects=tuple(sensing))), motion)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise, reading_error
+from identify.dataset.drive import reading_error
 from identify.dataset.motion import Blocks, Motion
 from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import rms
@@ -152,7 +152,7 @@ def added_force(
     fitted: Fitted, axis: AxisModel, logs: Sequence[PreparedLog], without: Array
 ) -> Array:
     """Force (n,) N that the effect adds to the residual of an axis, apparent force included."""
-    if not is_noise(fitted.effect):
+    if not fitted.effect.is_noise:
         return residual(axis.with_effect(fitted), logs) - without
     alone = replace(axis, effects=(fitted,))
     rates = [log.fine.acceleration(reading_error(alone, log.motion)[1]) for log in logs]

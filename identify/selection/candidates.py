@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise
 from identify.dataset.noise_floor import noise_beside
 from identify.estimation.alignment import depends_on_time_origin, phases_found
 from identify.estimation.evidence import (
@@ -90,7 +89,7 @@ class Candidate:
     @property
     def is_noise(self) -> bool:
         """Whether the effect lowers no error but raises the noise floor."""
-        return is_noise(self.effect)
+        return self.effect.is_noise
 
 
 def candidate_of(

@@ -62,9 +62,8 @@ def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:
         again = best.axis.without(shape.empty.effect.name)
         second = _attempt(_as_it_is(base, again, dataset), dataset, shape.empty).fit
         best = min(best, second, key=lambda fit: fit.error)
-    return replace(
-        best, begun=base.begun
-    )  # whose law is not absent, though a curve is in its place
+    # Of the base, as its law is not absent, though a curve is in its place.
+    return replace(best, begun=base.begun)
 
 
 def _as_it_is(base: Fit, axis: AxisModel, dataset: Dataset) -> Fit:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise, knows_rounding
+from identify.dataset.drive import knows_rounding
 from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.free_curves import shapes_of
@@ -68,7 +68,7 @@ def tried_beside(
     """
     known = {*taken, *judged.fit.begun.names}
     effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
-    plain = [Added(e) for e in effects if not is_noise(e)]
+    plain = [Added(e) for e in effects if not e.is_noise]
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     if judged.at_floor:
         changes = []
@@ -86,7 +86,7 @@ def tried_beside(
     tried = _with_alike_evidence(tried)
     trim_memory()
     rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.fit])
-    noise = [as_noise(judged, e) for e in effects if is_noise(e) and not rounded]
+    noise = [as_noise(judged, e) for e in effects if e.is_noise and not rounded]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
     candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
@@ -226,7 +226,7 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     It is refitted whatever one linear step promises; ``Candidate.refused`` says why not to keep it.
     """
     before, change = Judged(base, dataset), Added(effect)
-    if is_noise(effect):
+    if effect.is_noise:
         return as_noise(before, effect).candidate
     look = change.look(before, Trial.beside(before))
     fit = change.refit(before, look)

@@ -16,7 +16,6 @@ from built_fits import CATALOGUE, FRICTION, PLAIN, built_machine
 from constructed import log_of
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import is_noise
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, split_by_log, sticks
 from identify.estimation.fit import fit_axis
@@ -37,7 +36,7 @@ STICKY = Fitted.at_start(CATALOGUE["lugre"])
 PHYSICAL = [
     e
     for e in CATALOGUE.values()
-    if e.strengths and not (e.is_nonparametric or is_noise(e) or e.of_joints)
+    if e.strengths and not (e.is_nonparametric or e.is_noise or e.of_joints)
 ]
 FRICTIONS = [e for e in PHYSICAL if e.kind is Kind.FRICTION]
 OTHERS = [e for e in PHYSICAL if e.kind is not Kind.FRICTION]
