@@ -71,7 +71,10 @@ HIDDEN: dict[str, tuple[Change, Expected]] = {
     ),
     "friction by position": (
         plain(modulation=0.3),
-        Expected(("position_dependent_friction",), shapes=("coulomb_viscous",), known=KNOWN),
+        Expected(
+            ("friction_ripple", "position_dependent_friction"), shapes=("coulomb_viscous",),
+            known=KNOWN,
+        ),
     ),
     "ripple": (plain(ripple=0.15), Expected(("force_constant_ripple",), known=KNOWN)),
     "spring": (sprung, Expected(("spring",), ("cable_slab", "gravity"), known=KNOWN)),

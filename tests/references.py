@@ -70,6 +70,11 @@ def force_constant_ripple(p: Values, q: Columns) -> Results:
     return {U: q.u * (1.0 + fourier(p, q.x / p["p"]))}
 
 
+@written_from("Fc, Fs -> (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)) Fc, Fs")
+def friction_ripple(p: Values, q: Columns) -> Results:
+    return {DRY: q.dry * (1.0 + fourier(p, q.x / p["p"]))}
+
+
 @written_from("reading(t) = x(t - tau)")
 def encoder_delay(p: Values, q: Columns) -> Results:
     """A straight line between samples; before the log the axis stood at its first position."""

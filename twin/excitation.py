@@ -15,6 +15,8 @@ class Repeats(Protocol):
     def pitches(self) -> tuple[float, ...]: ...
     @property
     def thrust_pitches(self) -> tuple[float, ...]: ...
+    @property
+    def friction_pitches(self) -> tuple[float, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class Repeating:
     lines: tuple[float, ...] = ()
     pitches: tuple[float, ...] = ()
     thrust_pitches: tuple[float, ...] = ()
+    friction_pitches: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,11 @@ class Excitation:
     def thrust_pitches(self) -> tuple[float, ...]:
         """The same of the motor's force in proportion to it, m."""
         return self.repeats.thrust_pitches
+
+    @property
+    def friction_pitches(self) -> tuple[float, ...]:
+        """The same of a force that turns with the direction of motion, m."""
+        return self.repeats.friction_pitches
 
     @property
     def travel(self) -> float:

@@ -130,6 +130,12 @@ class Fit:
         """The same of the residual over the command."""
         return self._repeating(np.concatenate([log.command for log in self.logs])[self.kept])
 
+    @cached_property
+    def friction_pitches(self) -> tuple[float, ...]:
+        """The same of the residual over the direction of motion."""
+        ways = [log.test_function.mean(np.sign(log.motion.velocity)) for log in self.logs]
+        return self._repeating(np.concatenate(ways)[self.kept])
+
     def _repeating(self, weight: Array) -> tuple[float, ...]:
         position = [log.test_function.mean(log.motion.position) for log in self.logs]
         place = np.concatenate(position)[self.kept]

@@ -163,6 +163,10 @@ class _Beside:
     def thrust_pitches(self) -> tuple[float, ...]:
         return self.base.thrust_pitches
 
+    @property
+    def friction_pitches(self) -> tuple[float, ...]:
+        return self.base.friction_pitches
+
 
 def tried_shapes(effect: Effect, excitation: Excitation) -> Iterator[dict[str, float]]:
     """Combinations of values to try for the nonlinear parameters that the effect scans."""

@@ -43,6 +43,7 @@ SPECIAL = {
     "roller_spikes": {"pitch": 0.03, "width": 0.025, "phase": 0.004, "ahead": 0.7, "behind": 0.3},
     "periodic_disturbance": {"f": 730.0, "a": 0.6, "b": -0.4},
     "payload_mass": {"ratio": 0.37},
+    "friction_ripple": {"p": 0.027, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
     "force_constant_ripple": {"p": 0.031, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
     "backlash": {"load": 0.3, "play": 3e-6, "frequency": 410.0, "damping": 0.21},
     "flexible_mode": {"load": 0.4, "frequency": 530.0, "damping": 0.13},

@@ -127,7 +127,8 @@ def test_pitches_are_half_a_cycle_apart_from_three_cycles_on(effect, most, trave
 @pytest.mark.parametrize(
     ("effect", "known", "wanted"),
     [("cogging", "pitches", (0.02, 0.04, 0.06)),
-     ("force_constant_ripple", "thrust_pitches", (0.02, 0.04))],
+     ("force_constant_ripple", "thrust_pitches", (0.02, 0.04)),
+     ("friction_ripple", "friction_pitches", (0.02, 0.04))],
 )  # fmt: skip
 def test_a_pitch_that_the_log_shows_may_be_that_of_a_harmonic(effect, known, wanted) -> None:
     np.testing.assert_allclose(

@@ -1,0 +1,37 @@
+"""Dry friction level that repeats along the track, as an eccentric gear or a bent screw makes it.
+
+Fc, Fs -> (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)) Fc, Fs, p a turn of the part
+that rubs. The preload of a ball screw, and its friction with it, repeats with the turn: S. Frey,
+M. Walther, A. Verl, "Periodic variation of preloading in ball screws", Prod. Eng. 4 (2010).
+"""
+
+from twin.effect import DRY, LEAST, MOST, Effect, Kind, Parameter, X
+from twin.law_parts import harmonic_terms, harmonics, of_shortest_pitch, pitches_to_try
+
+CYCLES = 70  # most over the travel that are tried before a model tells them
+
+
+def law(p, s, io):
+    sine, cosine, sine2, cosine2, _, _ = harmonics(io[X], p[0])
+    ripple = p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
+    io[DRY] *= max(1.0 + ripple, 0.01)  # friction cannot turn negative
+
+
+EFFECT = Effect(
+    kind=Kind.MODIFIER,
+    summary="dry friction level repeats along the track",
+    equation="Fc, Fs -> (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)) Fc, Fs",
+    source="Frey, Walther, Verl 2010, preload of ball screws",
+    parameters=(
+        Parameter(
+            "p", "m", 0.02, LEAST, MOST, "travel of one turn of the part that rubs", period=True,
+            scan=lambda e: pitches_to_try(e.friction_pitches, e.travel, 2, CYCLES),
+        ),
+        *harmonic_terms(2, "1", 0.5),
+    ),
+    law=law,
+    simplest=of_shortest_pitch,
+    several=True,
+    fingerprint="residual repeats along the track and flips with the direction of motion",
+    excited_by="constant-speed passes in both directions over several turns of each moving part",
+)  # fmt: skip
