@@ -14,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 
-from benchmarks.figures import Figure, told, write_results
+from benchmarks.figures import Figure, report, write_results
 from twin.errors import InputError
 
 # Each is loaded when it runs: some need packages that the others do without.
@@ -65,7 +65,7 @@ def measured(benchmarks: Iterable[ModuleType]) -> int:
         results[benchmark.TITLE] = benchmark.measure()
         print(f"  {perf_counter() - begun:.0f} s", file=sys.stderr, flush=True)
     write_results(results, Path(__file__).parent)
-    return told([f for figures in results.values() for f in figures])
+    return report([f for figures in results.values() for f in figures])
 
 
 if __name__ == "__main__":

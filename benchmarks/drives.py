@@ -16,7 +16,7 @@ from time import process_time
 
 import numpy as np
 
-from benchmarks.figures import Figure, Target, told
+from benchmarks.figures import Figure, Target, report
 from benchmarks.judgement import Expected, Row, judged, row_of, stated_wrong
 from benchmarks.second_simulator.drives import DRIVES, Drive, Plant, Recorder, log_of
 from identify.analysis.first_model import first_model
@@ -136,4 +136,4 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("-o", "--out", type=Path)
     given = parser.parse_args(arguments)
-    return told(figures(judged(jobs_of(given.seed), given.out)))
+    return report(figures(judged(jobs_of(given.seed), given.out)))

@@ -90,7 +90,7 @@ def shown(value: float | None) -> str:
     return f"{value:.0f}" if float(value).is_integer() else f"{value:.3g}"
 
 
-def told(figures: Sequence[Figure]) -> int:
+def report(figures: Sequence[Figure]) -> int:
     """Print figures; 0 where every target is met."""
     for f in figures:
         value = shown(f.value)

@@ -16,7 +16,7 @@ from time import process_time
 
 import numpy as np
 
-from benchmarks.figures import Figure, Target, told
+from benchmarks.figures import Figure, Target, report
 from benchmarks.judgement import Expected, Row, fitted, judged, row_of, stated_wrong
 from benchmarks.second_simulator.effects import INSIDE, OUTSIDE, Planted
 from benchmarks.second_simulator.kernel import AHEAD, BEHIND, FORCE
@@ -250,4 +250,4 @@ def main(arguments: Sequence[str]) -> int:
     seeds = range(*given.empty) if given.empty else ()
     jobs: dict[str, Callable[[], Row]] = {empty_name(s): partial(empty_row, s) for s in seeds}
     jobs |= jobs_of(given.effects, given.forms, given.floors, given.seeds)
-    return told(figures(judged(jobs, given.out)))
+    return report(figures(judged(jobs, given.out)))

@@ -149,7 +149,7 @@ def stated_wrong(rows: Iterable[Row]) -> list[str]:
 
 def in_line(row: Row) -> str:
     """A row of a table in Markdown."""
-    told = "<br>".join(map(_told, row["findings"])) or "-"
+    told = "<br>".join(map(_finding_cell, row["findings"])) or "-"
     errors = "<br>".join(
         f"{role} {before:.3g} > {after:.3g}"
         for role, (before, after) in row["errors"].items()
@@ -163,7 +163,7 @@ def in_line(row: Row) -> str:
     )
 
 
-def _told(f: Row) -> str:
+def _finding_cell(f: Row) -> str:
     names = "/".join((f["effect"], *f["tied"]))
     over = f" over {f['over']}" if f["over"] else ""
     stated = "-" if f["confidence"] is None else f"{f['confidence']:.0%}"

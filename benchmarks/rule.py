@@ -72,11 +72,11 @@ def results_of(cases: Sequence[Case]) -> dict[Setting, list[TrialResult]]:
     with ProcessPoolExecutor(os.cpu_count(), mp_context=context) as pool:
         for setting in settings():
             out[setting] = list(pool.map(run_with, [setting] * len(cases), cases))
-            print(f"  {told(setting)}: {line(out[setting])}", file=sys.stderr, flush=True)
+            print(f"  {described(setting)}: {line(out[setting])}", file=sys.stderr, flush=True)
     return out
 
 
-def told(setting: Setting) -> str:
+def described(setting: Setting) -> str:
     """A setting in words."""
     name, factor = setting
     return f"{name} {getattr(RULE, name):g} x {factor:g}" if name else "as it is"
@@ -98,7 +98,7 @@ def figures(results: dict[Setting, list[TrialResult]]) -> list[Figure]:
         ]
         change = sum(after - before for _, before, after in pairs) / len(pairs)
         note = "; ".join(filter(None, (line(changed), ", ".join(moved))))
-        out.append(Figure(told(setting), change, "1", Target(-MOST, MOST), note))
+        out.append(Figure(described(setting), change, "1", Target(-MOST, MOST), note))
     return out
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from time import process_time
 
 from benchmarks import real_machines
-from benchmarks.figures import Figure, Target, told
+from benchmarks.figures import Figure, Target, report
 from benchmarks.judgement import (
     EQUIVALENT,
     RIGHT,
@@ -350,4 +350,4 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("-o", "--out", type=Path, help="file for the rows as JSON, a line each")
     given = parser.parse_args(arguments)
     cases = [c for c in CASES if c.name.startswith(given.case)]
-    return told(figures(judge(cases, given.data, given.out)))
+    return report(figures(judge(cases, given.data, given.out)))

@@ -52,7 +52,7 @@ class DecisionRule:
 
     least_fall: float = 0.1
     """Part of the squared error below which a fall is hardly one: by a channel delay, between two
-    turns of a fit whose priors are weighed by the error, of a force that is foretold."""
+    turns of a fit whose priors are weighed by the error, of a predicted force."""
 
     least_shift: float = 0.05
     """Samples; less is no channel delay."""

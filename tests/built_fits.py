@@ -18,7 +18,7 @@ from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.scaling import Scaling
 from identify.selection.acceptance import Judged, Score, Taken
 from identify.selection.candidates import Candidate
-from identify.selection.changes import Added, Look
+from identify.selection.changes import Added, Screening
 from identify.selection.search import Step
 from identify.selection.trying import Tried
 from twin.effect import Effect, Excitation
@@ -110,7 +110,7 @@ def tried(candidate: Candidate, dataset: Dataset | None = None) -> Tried:
     """An added effect as a search has tried it."""
     change = Added(candidate.effect)
     judged = Judged(candidate.fit, dataset or dataset_stub())  # type: ignore[arg-type]
-    return Tried(change, Look(change, candidate.part), judged, candidate)
+    return Tried(change, Screening(change, candidate.part), judged, candidate)
 
 
 def step(candidate: Candidate | str = "cogging", *level: Candidate, **told: object) -> Step:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.figures import Figure, Target, told
+from benchmarks.figures import Figure, Target, report
 from benchmarks.mutation.faults import LEAST, PACKAGES, Fault, draw, is_native
 from benchmarks.mutation.reach import Reach, environment, reach
 
@@ -120,4 +120,4 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--least", type=int, default=LEAST, help="faults in each folder, at least")
     parser.add_argument("--root", type=Path, default=ROOT, help="another checkout of the project")
     given = parser.parse_args(arguments)
-    return told(measure(given.seed, given.count, given.root, given.least))
+    return report(measure(given.seed, given.count, given.root, given.least))

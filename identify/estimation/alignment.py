@@ -152,7 +152,7 @@ def time_origins(dataset: Dataset) -> Array:
     return np.array([log.motion.time_origin for log in dataset.logs])
 
 
-def with_given_origins(dataset: Dataset, begun: Array) -> Dataset:
+def begun_at(dataset: Dataset, begun: Array) -> Dataset:
     """The dataset with its logs begun at these times (n,) s, in the order of ``time_origins``."""
     pairs = zip(dataset.logs, begun, strict=True)
     return dataset.with_logs(_set(log, float(at)) for log, at in pairs)

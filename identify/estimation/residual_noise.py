@@ -1,13 +1,13 @@
-"""Whether what a fit leaves is noise: nothing that was measured foretells it.
+"""Whether what a fit leaves is noise: nothing that was measured predicts it.
 
 Slow force noise, such as of a cooling hose or of an amplifier, stands above the noise floor that
 sensors tell, and no spectrum of a sensor shows it. It is told from the residual itself, by one
 test: curves over each coordinate of the motion, and what moved before, are learned on most blocks
-of the logs and foretell the block that is left out. The controls are the residual itself, shifted
+of the logs and predict the block that is left out. The controls are the residual itself, shifted
 in time within each log: as large, as slow, and owed to nothing. All are tried with the same shifts,
 so that the best of them is set against the best of its controls (P. H. Westfall, S. S. Young,
 Resampling-Based Multiple Testing, 1993). The same is asked of its size: a force whose size the
-motion foretells is one that a law of the motion makes. So is what goes alike from the beginning of
+motion predicts is one that a law of the motion makes. So is what goes alike from the beginning of
 each log, beside controls that are shifted by another part of each. What curves cannot tell is asked
 of its spectrum and of its distribution: noise has no line, and no amplitude that it keeps.
 """
@@ -65,17 +65,17 @@ class Remainder:
         where = {name: values[kept] for name, values in every.items()}
         return cls(unabsorbed(force, basis), basis, where, _past(every, log)[kept], log[kept])
 
-    def is_foretold(self) -> bool:
-        """Whether something foretells a part of the force that matters."""
-        return self._foretold(self.force, self.basis) or self._drifts()
+    def is_predictable(self) -> bool:
+        """Whether a part of the force that matters follows from something measured."""
+        return self._predictable(self.force, self.basis) or self._drifts()
 
-    def size_is_foretold(self) -> bool:
+    def size_is_predictable(self) -> bool:
         """The same of its size, the logarithm of its square; a few large values do not decide."""
         size = np.log1p(self.force**2 / max(np.mean(self.force**2), np.finfo(float).tiny))
-        return self._foretold(size - size.mean(), np.zeros((len(size), 0)))
+        return self._predictable(size - size.mean(), np.zeros((len(size), 0)))
 
-    def _foretold(self, values: Array, basis: Array) -> bool:
-        """Whether values (n,) are foretold by something; basis (n, k): of what was fitted."""
+    def _predictable(self, values: Array, basis: Array) -> bool:
+        """Whether values (n,) are predicted by something; basis (n, k): of what was fitted."""
         columns = (unabsorbed(c, basis) for c in self._predictors())
         at_random = np.random.default_rng(0).uniform(size=(CONTROLS, len(self._spans)))
         return self._stand_out(values, basis, columns, at_random)
@@ -97,7 +97,7 @@ class Remainder:
     def _stand_out(
         self, values: Array, basis: Array, columns: Iterable[Array], turns: Array
     ) -> bool:
-        """Whether a part of values (n,), and more than of any control, is foretold by columns.
+        """Whether a part of values (n,), and more than of any control, is predicted by columns.
 
         turns (m, logs): 0..1, by which the controls are shifted within each log.
         """
@@ -113,7 +113,7 @@ class Remainder:
         return bool(best[0] > RULE.least_fall and best[0] > best[1:].max())
 
     def _parts(self, columns: Array, tried: Array) -> Array:
-        """Of the squared sum of each force (n, m) what columns (n, k) foretell, (m,).
+        """Of the squared sum of each force (n, m) what columns (n, k) predict, (m,).
 
         Each block by what the others teach; ridge regression, by inner products of blocks.
         """
@@ -152,7 +152,7 @@ class Remainder:
 def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
     gaussian, laplace = 3.0, 6.0  # kurtosis of these noises
-    logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once foretells nothing
+    logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once predicts nothing
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
     # 0.5 of the force, RMS: a larger rest is of another machine
     if len(logs) == 1 or fit.error > 0.5 * rms(command):
@@ -161,7 +161,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
     least = gaussian - SURE * np.sqrt(24.0 / effective_samples(rest.force))
-    if kurtosis < least or rest.is_foretold() or rest.has_line():
+    if kurtosis < least or rest.is_predictable() or rest.has_line():
         return False
     if fit.noise.follows_motion:
         return True
@@ -169,7 +169,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
         return False
     alike = 1.5  # times the error of the training logs that noise may have on others
     larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > alike * fit.error
-    return not larger and not rest.size_is_foretold()
+    return not larger and not rest.size_is_predictable()
 
 
 def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:

@@ -44,7 +44,7 @@ class Taken:
 
     t: logarithmic gain over blocks, over its standard error. whole, typical: part of what is left
     above the noise floor, of all of it and of that of a typical block, at most 1. apart: the mean
-    square of what the two models foretell differently, over that of what is left.
+    square of what the two models predict differently, over that of what is left.
     """
 
     t: float
@@ -196,7 +196,7 @@ def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -
 def prefers(one: Judged, other: Judged) -> bool:
     """Whether the logs clearly prefer one model to another, where both explain them.
 
-    Logs for which the two foretell the same force, or nearly, say nothing of it: at the noise
+    Logs for which the two predict the same force, or nearly, say nothing of it: at the noise
     floor, where they differ by less than noise lets tell. All others have to agree; and where more
     than noise is left, which one of the two may take by chance, on a difference that matters.
     """
@@ -238,7 +238,7 @@ def taken(before: Array, after: Array, floor: float, charge: float = 0.0) -> Tak
 def most_evidence(before: Array, after: Array, floor: float) -> float:
     """Twice the most log likelihood that there can be between two models of residuals (n,) N.
 
-    By how far apart they foretell the force, in units of the noise floor (N RMS).
+    By how far apart they predict the force, in units of the noise floor (N RMS).
     """
     both = np.isfinite(before) & np.isfinite(after)
     if not both.any():

@@ -55,7 +55,7 @@ class Candidate:
     doubt: str | None = None
 
     @classmethod
-    def looked(cls, before: Judged, fit: Fit, effect: Effect, promise: float) -> Candidate:
+    def screened(cls, before: Judged, fit: Fit, effect: Effect, promise: float) -> Candidate:
         """An effect that was not refitted; promise: part of the error that a linear step takes."""
         error = before.other_error
         gain = Gain(error, error * np.sqrt(max(1.0 - max(promise, 0.0), 0.0)), 0.0)

@@ -1,6 +1,6 @@
 """Changes of a model that a diagnosis may make: an effect more, an exponent free, a free curve.
 
-Each can be looked at by one linear step, be refitted, and be undone, whatever it is; so one search
+Each can be screened by one linear step, be refitted, and be undone, whatever it is; so one search
 and one acceptance test serve them all.
 """
 
@@ -35,7 +35,7 @@ Logs = Sequence[PreparedLog]
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class Screening:
     """What is known of a change before any refit.
 
     promise: part of the error above the floor that it takes in one linear step (``acceptance``).
@@ -58,10 +58,10 @@ class Change(Protocol):
     def effect(self) -> Effect:
         """The effect that it adds or changes; of a free curve the curve itself."""
 
-    def look(self, judged: Judged, trial: Trial) -> Look:
+    def screen(self, judged: Judged, trial: Trial) -> Screening:
         """One linear step beside a fit."""
 
-    def refit(self, judged: Judged, look: Look) -> Fit:
+    def refit(self, judged: Judged, screening: Screening) -> Fit:
         """The fit with the change, from its first start."""
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
@@ -81,7 +81,7 @@ class Added:
     def name(self) -> str:
         return self.effect.name
 
-    def look(self, judged: Judged, trial: Trial) -> Look:
+    def screen(self, judged: Judged, trial: Trial) -> Screening:
         fit, dataset = judged.fit, judged.dataset
         found = starts(fit, dataset, self.effect)
         if self.effect.kind is Kind.FRICTION:
@@ -89,9 +89,9 @@ class Added:
         axes = tuple(fit.axis.with_effect(s.fitted) for s in found)
         # Of the training logs: where a period is only scanned, others tell little of it.
         left = max(1.0 - found[0].share(fit), 0.0) * fit.error**2
-        return Look(self, part_of(fit.error**2, left, fit.floor**2), axes)
+        return Screening(self, part_of(fit.error**2, left, fit.floor**2), axes)
 
-    def _on_heads(self, judged: Judged, found: Sequence[Start]) -> Look:
+    def _on_heads(self, judged: Judged, found: Sequence[Start]) -> Screening:
         """Another friction, which no linear step puts in the place of one: a fit on the heads.
 
         What it takes of all training logs counts as well, as their heads may hold little of the
@@ -116,10 +116,10 @@ class Added:
             # 12 of the best one, where it helps: frictions with a memory need them
             first = fit_roughly(first.axis, heads, 12)
             most = promise(first)
-        return Look(self, most, tuple(f.axis for f in (first, *others)))
+        return Screening(self, most, tuple(f.axis for f in (first, *others)))
 
-    def refit(self, judged: Judged, look: Look) -> Fit:
-        return simplified(fit_axis(look.axes[0], judged.dataset.fit), judged, self.effect)
+    def refit(self, judged: Judged, screening: Screening) -> Fit:
+        return simplified(fit_axis(screening.axes[0], judged.dataset.fit), judged, self.effect)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
         return axis_less(self.effect, axis, base) if self.name in axis.names else None
@@ -149,7 +149,7 @@ class Freed:
         law = axis[self.name]
         return axis.with_effect(replace(law, fixed=law.fixed - {self.parameter}))
 
-    def look(self, judged: Judged, trial: Trial) -> Look:
+    def screen(self, judged: Judged, trial: Trial) -> Screening:
         """By the change of the residual at two other values: the law bends between them."""
         axis, free = judged.fit.axis, self.free(judged.fit.axis)
         law = free[self.name]
@@ -162,10 +162,10 @@ class Freed:
             return split_by_log(np.column_stack([t - now for t in then]), logs)
 
         promise = trial.part(with_unit_penalty(columns, judged.fit), sticking=sticks(axis))
-        return Look(self, promise, tuple(axes))
+        return Screening(self, promise, tuple(axes))
 
-    def refit(self, judged: Judged, look: Look) -> Fit:
-        return fit_axis(look.axes[0], judged.dataset.fit)
+    def refit(self, judged: Judged, screening: Screening) -> Fit:
+        return fit_axis(screening.axes[0], judged.dataset.fit)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
         law = axis[self.name] if self.name in axis.names else None
@@ -193,11 +193,11 @@ class Reshaped:
     def effect(self) -> Effect:
         return self.shape.empty.effect
 
-    def look(self, judged: Judged, trial: Trial) -> Look:
+    def screen(self, judged: Judged, trial: Trial) -> Screening:
         columns, resting = self.columns(judged, judged)
-        return Look(self, trial.part(columns, sticking=resting))
+        return Screening(self, trial.part(columns, sticking=resting))
 
-    def refit(self, judged: Judged, look: Look) -> Fit:
+    def refit(self, judged: Judged, screening: Screening) -> Fit:
         return fit_in_place(judged.fit, judged.dataset, self.shape)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
@@ -235,13 +235,13 @@ def control(change: Change, without: Judged, fit: Judged) -> float:
     return Trial.beside(without).control(columns, sticking=resting)
 
 
-def from_all_starts(judged: Judged, look: Look, first: Fit) -> Fit:
+def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
     """The best of a first fit and of those from all other starts.
 
     The effect was missing when the base was fitted, which distorts its values, so one start has
     those that the base began with.
     """
-    change, logs, axes = look.change, judged.dataset.fit, look.axes[1:]
+    change, logs, axes = screening.change, judged.dataset.fit, screening.axes[1:]
     if not isinstance(change, Added):
         return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
     begun = judged.fit.begun.with_effect(first.axis[change.name])
@@ -321,7 +321,7 @@ def _resting(without: Judged, fit: Judged) -> bool:
     return sticks(without.fit.axis) or sticks(fit.fit.axis)
 
 
-@lru_cache(maxsize=4)  # every other friction is looked at beside the same fit
+@lru_cache(maxsize=4)  # every other friction is screened beside the same fit
 def _before_a_friction(fit: Fit, dataset: Dataset) -> tuple[tuple[Logs, Array], ...]:
     """Heads and training logs, with the residual (n,) N of an axis fitted to each."""
     refitted = fit_axis(fit.axis, dataset.heads).axis

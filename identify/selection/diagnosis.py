@@ -12,7 +12,7 @@ from identify.estimation.residual_dependence import Dependence, Repeat, find_dep
 from identify.estimation.residual_noise import with_own_noise
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
-from identify.selection.changes import Added, Look
+from identify.selection.changes import Added, Screening
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
 from identify.selection.search import Found, Step, is_level, search
 from identify.selection.trying import Tried
@@ -228,7 +228,7 @@ def _others_alike(step: Step, found: Found) -> list[Tried]:
     rivals = [c for c in others if own & {p.name for p in c.effect.parameters}]
     changes = [Added(c.effect) for c in rivals]
     return [
-        Tried(change, Look(change, 0.0), Judged(c.fit, found.dataset), c)
+        Tried(change, Screening(change, 0.0), Judged(c.fit, found.dataset), c)
         for change, c in zip(changes, rivals, strict=True)
     ]
 

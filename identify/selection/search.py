@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.alignment import realigned, synchronised, time_origins, with_given_origins
+from identify.estimation.alignment import begun_at, realigned, synchronised, time_origins
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, fit_axis
 from identify.estimation.least_squares import unabsorbed
@@ -25,8 +25,8 @@ from identify.selection.candidates import Candidate, candidate_of, ordered
 from identify.selection.changes import (
     Added,
     Change,
-    Look,
     Reshaped,
+    Screening,
     control,
     freed_of,
     in_simplest_values,
@@ -133,7 +133,7 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     part, given = found.dataset, dataset.fit
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
-    dataset = with_given_origins(dataset, time_origins(part))
+    dataset = begun_at(dataset, time_origins(part))
     same = all(a is b for a, b in zip(given, dataset.fit, strict=True))
     first = base
     if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
@@ -212,8 +212,8 @@ def _with_free_exponents(
     added = {s.change.name for s in steps if isinstance(s.change, Added)}
     out: tuple[Step, ...] = ()
     for change in (c for c in freed_of(judged.fit.axis) if c.name in added):
-        look = Look(change, 0.0, (change.free(judged.fit.axis),))
-        freed = judged_change(judged, look, change.refit(judged, look))
+        screening = Screening(change, 0.0, (change.free(judged.fit.axis),))
+        freed = judged_change(judged, screening, change.refit(judged, screening))
         asked = freed.candidate.delta_bic > RULE.least_bic and not freed.candidate.doubt
         if asked and freed.candidate.gain.t > -least_t(1):  # other logs do not contradict it
             judged, out = freed.judged, (*out, Step(freed))
@@ -294,7 +294,8 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
     least = 0.66 * curve.candidate.part
     laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
     alone = (
-        t if t.candidate.supported else judged_change(judged, t.look, t.judged.fit) for t in laws
+        t if t.candidate.supported else judged_change(judged, t.screening, t.judged.fit)
+        for t in laws
     )
     return [t for t in alone if t.candidate.supported]
 

@@ -1,4 +1,4 @@
-"""Changes tried beside a fit: looked at by one linear step, the promising refitted, and judged.
+"""Changes tried beside a fit: screened by one linear step, the promising refitted, and judged.
 
 Of all changes for the search; of a single one for whoever asks for it.
 """
@@ -23,8 +23,8 @@ from identify.selection.changes import (
     Added,
     Change,
     Freed,
-    Look,
     Reshaped,
+    Screening,
     control,
     freed_of,
     from_all_starts,
@@ -47,7 +47,7 @@ class Tried:
     """A change beside a fit, refitted: the fit with it, and what speaks for it."""
 
     change: Change
-    look: Look
+    screening: Screening
     judged: Judged
     candidate: Candidate
 
@@ -74,12 +74,12 @@ def tried_beside(
         changes = []
     trial = Trial.beside(judged)
     trying = partial(progress, "trying changes")
-    looks = spread(lambda c: c.look(judged, trial), changes, trying)
-    tried = _refitted(judged, looks, len({e.kind for e in effects}), progress)
+    screenings = spread(lambda c: c.screen(judged, trial), changes, trying)
+    tried = _refitted(judged, screenings, len({e.kind for e in effects}), progress)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         progress("trying free curves", 0, 1)
-        curves = [c.look(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
+        curves = [c.screen(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
         tried += _refitted(judged, best, len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
@@ -88,14 +88,14 @@ def tried_beside(
     rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.fit])
     noise = [as_noise(judged, e) for e in effects if e.is_noise and not rounded]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
-    looked = [_as_looked(judged, k) for k in looks if isinstance(k.change, Added)]
-    candidates = [ranked.get(c.effect.name, c) for c in looked] + [n.candidate for n in noise]
+    screened = [_as_screened(judged, k) for k in screenings if isinstance(k.change, Added)]
+    candidates = [ranked.get(c.effect.name, c) for c in screened] + [n.candidate for n in noise]
     return judged, [*tried, *noise], candidates
 
 
 def _refitted(
     judged: Judged,
-    looks: Sequence[Look],
+    screenings: Sequence[Screening],
     among: int,
     progress: Progress,
     known: Sequence[Tried] = (),
@@ -107,7 +107,7 @@ def _refitted(
     """
     most = max((t.candidate.part for t in known), default=0.0)
     asked = RULE.promise * max(RULE.least_part, most)
-    waiting = sorted((k for k in looks if k.promise >= asked), key=lambda k: -k.promise)
+    waiting = sorted((k for k in screenings if k.promise >= asked), key=lambda k: -k.promise)
     refitting = partial(progress, "refitting the promising")
     first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS], refitting)
     most = max([most, *(_roughly(judged, f) for _, f in first)])
@@ -121,8 +121,8 @@ def _refitted(
     return spread(lambda pair: judged_change(judged, *pair, among), fits, judging)
 
 
-def _fit_of(judged: Judged, look: Look) -> Fit:
-    return look.change.refit(judged, look)
+def _fit_of(judged: Judged, screening: Screening) -> Fit:
+    return screening.change.refit(judged, screening)
 
 
 def _roughly(judged: Judged, fit: Fit) -> float:
@@ -131,19 +131,19 @@ def _roughly(judged: Judged, fit: Fit) -> float:
     return (judged.fit.error**2 - fit.error**2) / above
 
 
-def judged_change(judged: Judged, look: Look, fit: Fit, among: int = 1) -> Tried:
+def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1) -> Tried:
     """A refitted change with its score; its controls are asked only where they could decide.
 
     among: of how many changes it is chosen.
     """
-    change, after = look.change, Judged(fit, judged.dataset)
+    change, after = screening.change, Judged(fit, judged.dataset)
     if not fit.at_floor:
         after = settled(after)
     found = candidate_of(judged, after, change.effect, parameters(change), among)
     if found.supported and found.score:
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
-    return Tried(change, look, after, found)
+    return Tried(change, screening, after, found)
 
 
 def parameters(change: Change) -> tuple[str, ...]:
@@ -172,11 +172,11 @@ def refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
     return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
 
 
-def _as_looked(judged: Judged, look: Look) -> Candidate:
+def _as_screened(judged: Judged, screening: Screening) -> Candidate:
     """An absent effect that was not refitted, as its linear step predicts it."""
-    axis = look.axes[0]
+    axis = screening.axes[0]
     fit = replace(judged.fit, axis=axis, scaling=Scaling.of(axis, judged.fit.logs))
-    return Candidate.looked(judged, fit, look.change.effect, look.promise)
+    return Candidate.screened(judged, fit, screening.change.effect, screening.promise)
 
 
 def as_noise(judged: Judged, effect: Effect) -> Tried:
@@ -185,7 +185,7 @@ def as_noise(judged: Judged, effect: Effect) -> Tried:
     axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
     after = Judged(finished(axis, fit.begun, dataset.fit, fit.outcome), dataset)
     change = Added(effect)
-    return Tried(change, Look(change, 0.0), after, noise_candidate(judged, after, effect))
+    return Tried(change, Screening(change, 0.0), after, noise_candidate(judged, after, effect))
 
 
 def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried]]:
@@ -217,7 +217,7 @@ def _with_alike_evidence(tried: list[Tried]) -> list[Tried]:
 
 def _scored_again(judged: Judged, tried: Tried) -> Tried:
     among = tried.candidate.score.among if tried.candidate.score else 1
-    return judged_change(judged, tried.look, tried.judged.fit, among)
+    return judged_change(judged, tried.screening, tried.judged.fit, among)
 
 
 def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
@@ -228,11 +228,11 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     before, change = Judged(base, dataset), Added(effect)
     if effect.is_noise:
         return as_noise(before, effect).candidate
-    look = change.look(before, Trial.beside(before))
-    fit = change.refit(before, look)
+    screening = change.screen(before, Trial.beside(before))
+    fit = change.refit(before, screening)
     if not fit.at_floor:
-        fit = fit_multistart(from_all_starts(before, look, fit).axis, dataset, base.begun)
-    return judged_change(before, look, fit).candidate
+        fit = fit_multistart(from_all_starts(before, screening, fit).axis, dataset, base.begun)
+    return judged_change(before, screening, fit).candidate
 
 
 def reshape(
@@ -248,9 +248,9 @@ def reshape(
         trial = Trial.beside(before)
         for shape in shapes_of(fit, before.dataset, effect.name):
             change = Reshaped(shape, fit.axis[effect.name])
-            look = change.look(before, trial)
-            after = change.refit(before, look)
-            tried.append((judged_change(before, look, after).candidate, change))
+            screening = change.screen(before, trial)
+            after = change.refit(before, screening)
+            tried.append((judged_change(before, screening, after).candidate, change))
     if not tried:
         raise InputError(
             f"the logs show no other shape of {effect.name}: no curve in its place lowers their "
