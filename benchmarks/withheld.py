@@ -223,7 +223,12 @@ def arm(rate: float, joints: Sequence[str], joint: str, *laws: Fitted) -> Machin
 # TX40: Coulomb and viscous friction and a rotor on each joint; the motor of joint 6 turns with
 # joint 5 as well, and its friction acts on both; the friction of joint 3 follows its load.
 RUBS, ROTOR = law("coulomb_viscous", Fc=3.0, Fs=3.0, sigma2=1.0), law("rotor_inertia", inertia=0.05)
-TX40_KNOWN = (BENDS, "constant_force", "gravity", "spring", "cogging", "force_constant_ripple")
+# The friction of joint 5 repeats every 0.1394 rad: a turn of its motor, behind a gear of 45, is
+# 2 pi/45 = 0.1396 rad.
+TX40_KNOWN = (
+    BENDS, "constant_force", "gravity", "spring", "cogging", "force_constant_ripple",
+    "friction_ripple",
+)  # fmt: skip
 TX40 = tuple(
     Case(
         f"TX40: {term}", real_machines.tx40,
