@@ -25,6 +25,7 @@ from identify.results.results import (
     AxisSummary,
     Comparison,
     Diagnosis,
+    Feedforward,
     FitResult,
     SimulationFit,
 )
@@ -34,6 +35,7 @@ from identify.selection.findings import Finding
 from identify.validation.agreement import AxisAgreement, Cause, Difference
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import MisfitMap, Region
+from identify.validation.tracking import AxisTracking, TrackingError
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel
@@ -303,6 +305,13 @@ def addition(kept: bool = True) -> Addition:
         position_log="run 1",
         notes=("mass moved", "the errors told flatter it"),
     )
+
+
+def feedforward() -> Feedforward:
+    """Of a model whose static friction no feedforward holds."""
+    every = (TrackingError(o * 1e-6, 3.1 * o * 1e-6) for o in (9.7, 4.3, 1.9))
+    found = AxisTracking(*every, {"cogging": 2.3e-6, "lugre": 7.1e-7})
+    return Feedforward(MODEL, MODEL, ("run 1", "run 2"), {"x": found})
 
 
 class Page(HTMLParser):

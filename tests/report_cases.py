@@ -7,11 +7,8 @@ from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
-import built_results as made
-
 from identify import workflow
-from identify.output.report import SECTIONS, facts, sections, write_report
-from identify.output.report.page import page
+from identify.output.report import write_report
 from identify.output.report.subject import Subject
 from identify.results.results import Addition, Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -119,19 +116,3 @@ class Outline(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         self.text += "" if self._apart else data
-
-
-TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
-
-
-def subject_of(
-    diagnosis: Diagnosis | None = None, *, history=made.STEPS, additions=(), **changes: object
-) -> Subject:
-    """The subject of a report of built results."""
-    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
-
-
-def page_of(subject: Subject, anchors: tuple[str, ...] = TABLES) -> made.Page:
-    """Its page with these sections, read back."""
-    shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
-    return made.Page(page(subject.title, facts(subject), shown))

@@ -20,6 +20,7 @@ from identify.output.numbers import Scale, capitalised, number, quantity, span, 
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.output.words.fit import aliasing_in_words, moved_in_words
 from identify.output.words.plan import gap_in_words
+from identify.output.words.residual import place_in_words
 from identify.results.results import Addition
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import in_short
@@ -119,6 +120,24 @@ def test_a_scale_keeps_the_value(unit: str) -> None:
 )
 def test_an_interval_has_two_digits_of_its_half_width(unit, ends, values, printed) -> None:
     assert Scale.of(unit, [values[-1]]).within(*ends, *values) == printed
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"low": 0.0, "high": 1.5}, "moving forwards"),
+        ({"low": -1.5, "high": 0.0}, "moving backwards"),
+        ({"coordinate": "standstill", "unit": "1", "low": 0.0, "high": 1.0}, "in motion"),
+        ({"coordinate": "standstill", "unit": "1", "low": 1.0, "high": 2.0}, "at standstill"),
+        (
+            {"coordinate": "position", "unit": "m", "low": 0.01131, "high": 0.01157},
+            "position between 11.31 and 11.57 mm",
+        ),
+    ],
+)
+def test_a_place_is_named_with_the_digits_of_its_width(changed, said):
+    _, back = made.comparison_of().worst
+    assert place_in_words(replace(back, **changed)) == said
 
 
 @pytest.mark.parametrize(
