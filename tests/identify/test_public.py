@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +84,8 @@ def test_what_is_no_model_is_one_line(log) -> None:
 
 def test_logs_and_models_print_themselves_in_a_line(log) -> None:
     assert repr(log).startswith("<Log of 2 s at 10000 Hz, x: setpoint_position, ")
+    least = f"{log.axes['x'].position.min():.4g}"
+    assert f"xpositionm{least}" in re.sub(r"<.*?>|\s", "", log._repr_html_())
     assert repr(log.axes["x"]).startswith("<AxisLog of 20000 samples: setpoint_position (m), ")
     model = twin.load_model("proton_xy")
     assert repr(model).startswith("<MachineModel Proton Motion Stage at 10000 Hz, ")

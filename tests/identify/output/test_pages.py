@@ -24,6 +24,7 @@ from identify.estimation.intervals import refusal
 from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.page import page
 from identify.output.report.subject import Subject
+from identify.results import Printed
 from identify.results.results import Comparison, Diagnosis, OnMachine
 from identify.selection.diagnosis import Verdict
 
@@ -56,6 +57,13 @@ def said_of(found: Diagnosis) -> str:
     return written(subject_of(found, comparison=compared, history=()), SAID)
 
 
+def notebook(result: Printed) -> str:
+    """What a notebook shows, in which nothing is run or loaded."""
+    text = result._repr_html_() or ""
+    assert not re.search(r"<(script|style|link|img|button)", text)
+    return in_lines(text)
+
+
 def in_lines(text: str) -> str:
     drawn = re.sub(r'data-chart="(.*?)"', lambda spec: chart(html.unescape(spec[1])), text)
     lines = (line.strip() for line in drawn.splitlines())
@@ -82,6 +90,12 @@ def quiet_beside() -> Comparison:
     y = made.comparison_of("y")
     y = replace(y, residual=np.full(len(y.residual), 0.001))
     return Comparison(made.MODEL, {"x": made.comparison_of(), "y": y})
+
+
+def by_frequency() -> Comparison:
+    """A comparison of one axis with the spectrum of its error."""
+    maps = [made.map_of("frequency", "Hz", 0.0)]
+    return Comparison(made.MODEL, {"x": replace(made.comparison_of(), maps=maps)})
 
 
 def of_a_curve() -> str:
@@ -171,9 +185,14 @@ PAGES: dict[str, Callable[[], str]] = {
     "diagnosis: laws": lambda: written(subject_of(of_both_laws()), ("equations", "ranking")),
     "diagnosis: no intervals": lambda: written(subject_of(no_intervals()), ("parameters",)),
     **{name: lambda d=result: said_of(d()) for name, result in SAID_OF.items()},
-    "notebook: fit": lambda: in_lines(made.fit_result()._repr_html_() or ""),
-    "notebook: comparison": lambda: in_lines(made.compared()._repr_html_() or ""),
-    "notebook: diagnosis": lambda: in_lines(made.diagnosed()._repr_html_() or ""),
+    "comparison by frequency": lambda: written(subject_of(comparison=by_frequency()), ("regions",)),
+    "notebook: fit": lambda: notebook(made.fit_result()),
+    "notebook: fit, intervals refused": lambda: notebook(TEXTS["fit, intervals refused"]()),
+    "notebook: fit of curves": lambda: notebook(
+        replace(made.fit_result(), estimates={"x": (), "y": ()})
+    ),
+    "notebook: comparison": lambda: notebook(by_frequency()),
+    "notebook: diagnosis": lambda: notebook(made.diagnosed()),
 }
 
 
