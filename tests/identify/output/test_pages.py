@@ -108,13 +108,13 @@ def of_a_curve() -> str:
 
 def no_intervals() -> Diagnosis:
     """Before anything was found, for a reason that holds for all parameters."""
-    found = made.diagnosed()
-    own = found.summaries["x"]
-    wrong = tuple(
-        replace(e, low=None, high=None, reason=refusal(made.BASE) if e.free else None)
-        for e in own.before
+    found, why = made.diagnosed(), refusal(made.BASE)
+    wrong = (
+        replace(e, low=None, high=None, reason=why if e.free else None)
+        for e in found.summaries["x"].before
     )
-    return replace(found, summaries={**found.summaries, "x": replace(own, before=wrong)})
+    x = replace(found.summaries["x"], before=tuple(wrong))
+    return replace(found, summaries={**found.summaries, "x": x})
 
 
 def y_first() -> Diagnosis:
@@ -135,8 +135,11 @@ def undecided() -> Diagnosis:
 
 def contradicted() -> Diagnosis:
     """The only effect that is named is not confirmed by the test logs."""
-    against = replace(ONE, tested=made.errors(2.17, 2.29, Role.TEST)[0])
-    return made.diagnosed(made.diagnosis_of(findings=(against,)))
+    against, _ = made.errors(2.17, 2.29, Role.TEST)
+    finding = replace(ONE, tested=against)
+    found = made.diagnosed(made.diagnosis_of(findings=(finding,)))
+    x = replace(found.summaries["x"], tested=against)
+    return replace(found, summaries={**found.summaries, "x": x})
 
 
 def aperiodic() -> Diagnosis:

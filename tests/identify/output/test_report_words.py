@@ -16,7 +16,7 @@ from identify import workflow
 from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.experiment_design.missing_excitation import Gap
-from identify.output.numbers import Scale, capitalised, number, quantity, span, typeset
+from identify.output.numbers import Scale, capitalised, quantity, span, typeset
 from identify.output.words.addition import axis_in_words, notes_in_words
 from identify.output.words.fit import aliasing_in_words, moved_in_words
 from identify.output.words.plan import gap_in_words
@@ -27,15 +27,6 @@ from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests
 from twin.model.machine import HistoryStep
 from twin.model.units import LINEAR
-
-
-def test_without_a_diagnosis(case: Case, tmp_path: Path) -> None:
-    text = case.write(tmp_path / "c.html", diagnosis=None, history=(), additions=())
-    assert re.findall(r'<section id="(\w+)"', text) == [
-        "answer", "where", "time", "map", "regions", "parameters", "logs", "tests",
-    ]  # fmt: skip
-    ratio = number(case.diagnosis.comparison.axes["x"].ratio)
-    assert f"Axis x: force error {ratio} times the noise floor" in text
 
 
 def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
