@@ -17,6 +17,7 @@ from identify.cli.command import Said, progress_on_stderr, require_apart
 from identify.cli.shared import (
     ASSUMES,
     CheckedRecordings,
+    Done,
     Effects,
     FitLogs,
     Holdout,
@@ -30,10 +31,10 @@ from identify.cli.shared import (
     app,
     briefly,
     loaded,
-    meaningless,
     minor,
     said_of,
     with_logs,
+    written,
 )
 from twin.errors import InputError
 
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
         CorrectedBody,
         Diagnosis,
         FitResult,
-        OnMachine,
         SimulationFit,
     )
     from twin.effects import Catalogue
@@ -66,7 +66,7 @@ def fit(
     logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
+    out: Annotated[Path | None, written("Fitted model to write.")] = None,
     objective: Annotated[
         Objective,
         typer.Option(
@@ -87,18 +87,16 @@ def fit(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.fit, catalogue=catalogue, test_function=test_function)
-    fitted, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
-    warnings = [*briefly(findings), *silent]
-    result: FitResult | SimulationFit = fitted
+    done = with_logs(job, machine, logs, holdout, test, fits=True)
+    result: FitResult | SimulationFit = done.result
+    alarms: list[str] = []
     if objective is Objective.SIMULATION:
         with progress_on_stderr() as progress:
-            result = moved = workflow.fit_simulation(fitted, progress=progress)
-        warnings += objectives_in_words(moved)
+            result = workflow.fit_simulation(done.result, progress=progress)
+        alarms = objectives_in_words(result)
     if out:
         save_model(result.model, out)
-    return said_of(result, warnings, left_out=silent)
+    return said_of(result, [*done.warnings, *alarms], left_out=done.left_out)
 
 
 @app.command()
@@ -121,16 +119,13 @@ def compare(
 
     machine, _ = loaded(model, effects)
     job = partial(workflow.compare, test_function=test_function)
-    result, findings, silent = with_logs(job, machine, logs)
+    done = with_logs(job, machine, logs)
     if html:
         source = _source(model, test_function, effects)
-        with progress_on_stderr() as progress:
-            known = workflow.on_machine(result.model, Recordings(logs), progress=progress)
-        title = f"{machine.name}: model against measurement"
-        _report(html, title, source, None, result, findings, known)
+        _report(html, f"{machine.name}: model against measurement", source, done, logs)
     if mcap:
-        workflow.side_by_side_of(result).write(mcap)
-    return said_of(result, [*briefly(findings), *silent], left_out=silent)
+        workflow.side_by_side_of(done.result).write(mcap)
+    return said_of(done.result, done.warnings, left_out=done.left_out)
 
 
 @app.command()
@@ -153,20 +148,12 @@ def diagnose(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
-    result, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
+    done = with_logs(job, machine, logs, holdout, test, fits=True)
     source = _source(model, test_function, effects)
     if html:
-        title = f"{machine.name}: what the model lacks"
-        with progress_on_stderr() as progress:
-            known = workflow.on_machine(
-                result.final_model, Recordings(logs), result.model if result.effect else None,
-                progress=progress,
-            )  # fmt: skip
-        _report(html, title, source, result, result.comparison, findings, known)
-    answer = answer_of(result, data_faults=findings, left_out=silent)
-    return Said(diagnose_text(result, source), answer, [*briefly(findings), *silent])
+        _report(html, f"{machine.name}: what the model lacks", source, done, logs)
+    answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
+    return Said(diagnose_text(done.result, source), answer, done.warnings)
 
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
@@ -179,25 +166,26 @@ def _source(model: str, test_function: float | None, effects: list[Path] | None)
 
 
 def _report(
-    out: Path,
-    title: str,
-    source: Source,
-    diagnosis: Diagnosis | None,
-    comparison: Comparison,
-    findings: Sequence[str],
-    known: OnMachine,
-) -> None:
-    """Write a report; findings: on the logs."""
+    out: Path, title: str, source: Source, done: Done[Comparison] | Done[Diagnosis],
+    logs: Sequence[Path],
+) -> None:  # fmt: skip
+    """Write the report of a result, with what its model says of the loop on these logs."""
+    from identify import workflow
     from identify.output.report import write_report
     from identify.output.report.subject import Subject
 
-    history = (diagnosis or comparison).model.history
-    subject = Subject(title, diagnosis, comparison, history, source=source, machine=known)
+    result = done.result
+    after, before = result.model, None
+    if isinstance(result, workflow.Diagnosis):
+        after, before = result.final_model, result.model if result.effect else None
+    with progress_on_stderr() as progress:
+        known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
+    doubts = minor(done.findings)
     write_report(
         out,
-        replace(subject, doubts=minor(findings)),
-        assumed=[line for line in findings if ASSUMES in line],
-        faults=[line for line in findings if ": error: " in line],
+        Subject.of(result, title, source=source, machine=known, doubts=doubts),
+        assumed=[line for line in done.findings if ASSUMES in line],
+        faults=[line for line in done.findings if ": error: " in line],
     )
 
 
@@ -206,7 +194,7 @@ def add(
     effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name from `twin effects`.")],
     model: Model,
     logs: FitLogs,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
+    out: Annotated[Path, written("Model with the effect.")],
     holdout: Holdout = None,
     test: Test = None,
     axis: Annotated[
@@ -232,19 +220,17 @@ def add(
 
     machine, catalogue = loaded(model, effects)
     job: Callable[..., Addition | CorrectedBody]
-    result: Addition | CorrectedBody
     if file := _copy_of(machine, out) if effect == LINK_MASS else None:
         job = partial(workflow.correct_body, file=file.name, test_function=test_function)
     else:
-        made = workflow.add_shape if shape else workflow.add
-        job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
-    result, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
+        call = workflow.add_shape if shape else workflow.add
+        job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
+    done: Done[Addition | CorrectedBody] = with_logs(job, machine, logs, holdout, test, fits=True)
+    made = done.result.model
     if file:
-        write_atomically(file, (result.model.mjcf or "").encode())
-    save_model(result.model, out)
-    return said_of(result, [*briefly(findings), *silent], result.kept, left_out=silent)
+        write_atomically(file, (made.mjcf or "").encode())
+    save_model(made, out)
+    return said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
 
 
 def _copy_of(machine: MachineModel, out: Path) -> Path:
@@ -317,10 +303,8 @@ def feedforward(
 
     machine, catalogue = loaded(model, effects)
     earlier = None if before is None else load_model(before, catalogue)
-    result, findings, silent = with_logs(
-        partial(workflow.feedforward, before=earlier), machine, logs
-    )
-    return said_of(result, [*briefly(findings), *silent])
+    done = with_logs(partial(workflow.feedforward, before=earlier), machine, logs)
+    return said_of(done.result, done.warnings)
 
 
 @app.command()
@@ -331,9 +315,7 @@ def frf(
             metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The responses to write (.csv, .mcap).")
-    ] = None,
+    out: Annotated[Path | None, written("The responses to write (.csv, .mcap).")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Bode diagram to write (.png, .svg, .pdf).")
     ] = None,
@@ -378,9 +360,7 @@ def plan(
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
     duration: Annotated[float, typer.Option(help="Length of the experiment in s.")] = 20.0,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")] = Path(
-        "experiment.toml"
-    ),
+    out: Annotated[Path, written("Experiment to write (.toml).")] = Path("experiment.toml"),
     holdout: Holdout = None,
     test_function: TestFunction = None,
     effects: Effects = None,
@@ -399,11 +379,11 @@ def plan(
         workflow.plan, between=[_rival(name, catalogue) for name in between or ()],
         catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
     )  # fmt: skip
-    result, findings, silent = with_logs(job, machine, logs, holdout)
-    if not result.decides:
-        return said_of(result, [*briefly(findings), *silent], fine=False)
-    chosen, table = result.chosen, out.with_suffix(ENDING)
-    said = said_of(result, [*briefly(findings), *silent], file=out, setpoints=table)
+    done = with_logs(job, machine, logs, holdout)
+    if not done.result.decides:
+        return said_of(done.result, done.warnings, fine=False)
+    chosen, table = done.result.chosen, out.with_suffix(ENDING)
+    said = said_of(done.result, done.warnings, file=out, setpoints=table)
     save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
     write_setpoints(chosen.experiment, machine, 0, table)
     text = (
@@ -425,9 +405,7 @@ def _rival(name: str, catalogue: Catalogue) -> Rival:
 @app.command()
 def demo(
     ctx: typer.Context,
-    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
-        "demo"
-    ),
+    folder: Annotated[Path, written("Folder to write into.")] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
     model: ModelOption = "proton_xy",
     effects: Effects = None,

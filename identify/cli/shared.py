@@ -7,8 +7,9 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 import typer
 
@@ -29,6 +30,12 @@ app = Commands(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+def written(what: str) -> Any:
+    """The option -o of a command, with its help."""
+    return typer.Option("--out", "-o", help=what)
+
 
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs.")]
 FitLogs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
@@ -56,7 +63,7 @@ TestFunction = Annotated[
         "left out.",
     ),
 ]
-Report = Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")]
+Report = Annotated[Path | None, written("HTML report.")]
 Effects = Annotated[
     list[Path] | None,
     typer.Option(
@@ -89,14 +96,6 @@ def loaded(model: str, effects: list[Path] | None) -> tuple[MachineModel, Catalo
 
     catalogue = load_catalogue(effects or ())
     return load_model(model, catalogue), catalogue
-
-
-def meaningless(model: MachineModel) -> tuple[str, ...]:
-    """Names of the faults of a log with which a fit gives numbers without a meaning.
-
-    Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
-    """
-    return ("UNIT", "SWAPPED") if model.joints else ("SIGN", "UNIT", "SWAPPED")
 
 
 class Recordings(Mapping[str, "Log"]):
@@ -178,27 +177,42 @@ def briefly(findings: Sequence[str]) -> list[str]:
     ]
 
 
+@dataclass(frozen=True)
+class Done(Generic[Result]):
+    """What a job on logs gave. findings: on its first logs; left_out: those that say nothing."""
+
+    result: Result
+    findings: list[str]
+    left_out: list[str]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is said of the logs on standard error."""
+        return [*briefly(self.findings), *self.left_out]
+
+
 def with_logs(
     job: Callable[..., Result],
     model: MachineModel,
     logs: list[Path] | None,
     *others: list[Path] | None,
-    refused: Collection[str] = (),
-) -> tuple[Result, list[str], list[str]]:
+    fits: bool = False,
+) -> Done[Result]:
     """The result of a job on a model and logs, those of each other role in turn.
 
-    Also the findings on the first logs, and which of any role were left out, and why. refused:
-    names of the faults with which one of the first is refused.
+    fits: to the first logs, which are refused with a fault that gives numbers without a meaning.
     """
     from twin.threads import share_one_arena
 
     share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]
-    recorded = CheckedRecordings(logs or (), every, refused)
+    # Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
+    meaningless = {"UNIT", "SWAPPED"} if model.joints else {"SIGN", "UNIT", "SWAPPED"}
+    recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, left_out() as silent:
         result = job(model, recorded, *rest, progress=progress)
-    return result, recorded.findings, silent
+    return Done(result, recorded.findings, silent)
 
 
 @contextmanager

@@ -22,17 +22,11 @@ if TYPE_CHECKING:
 SHOWN = ("answer", "found", "regions", "parameters", "logs")  # sections of a report
 
 
-def _subject(result: Diagnosis | Comparison) -> Subject:
-    diagnosis = result if isinstance(result, Diagnosis) else None
-    comparison = result.comparison if isinstance(result, Diagnosis) else result
-    return Subject("", diagnosis, comparison)
-
-
 def tables(result: Diagnosis | Comparison) -> str:
     """The answer and the tables of a report, without its plots."""
     parts = [part for part in SECTIONS if part.anchor in SHOWN]
     blocks: list[Block] = []
-    for section in sections(_subject(result), parts):
+    for section in sections(Subject.of(result), parts):
         blocks += [Heading(section.title)] if section.anchor != "answer" else []
         blocks += [block for block in section.blocks if not isinstance(block, Chart)]
     return fragment(blocks)
@@ -52,7 +46,7 @@ def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str |
     """The residual without and with what was found, as dots and as means over a coordinate."""
     import matplotlib.pyplot as plt
 
-    views = {view.name: view for view in _subject(result).views}
+    views = {view.name: view for view in Subject.of(result).views}
     if axis is not None and axis not in views:
         raise InputError(f"no axis '{axis}' in the result; it has {', '.join(views)}")
     view = views[axis] if axis else next(iter(views.values()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, all_found, said_of
@@ -34,6 +35,13 @@ class Subject:
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
     doubts: Sequence[str] = ()
+
+    @classmethod
+    def of(cls, result: Diagnosis | Comparison, title: str = "", **more: Any) -> Subject:
+        """The subject of a report of one result; more: fields of it."""
+        diagnosis = result if isinstance(result, Diagnosis) else None
+        comparison = result.comparison if isinstance(result, Diagnosis) else result
+        return cls(title, diagnosis, comparison, result.model.history, **more)
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:
