@@ -56,9 +56,8 @@ class Case:
         )  # fmt: skip
 
     def write(self, path: Path, **changes: object) -> str:
-        said = {name: changes.pop(name) for name in ("assumed", "faults") if name in changes}
         subject = replace(self.subject(self.diagnosis), **changes)  # type: ignore[arg-type]
-        write_report(path, subject, **said)  # type: ignore[arg-type]
+        write_report(path, subject)
         return path.read_text(encoding="utf-8")
 
 

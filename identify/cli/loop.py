@@ -15,7 +15,6 @@ import typer
 
 from identify.cli.command import Said, progress_on_stderr, require_apart
 from identify.cli.shared import (
-    ASSUMES,
     CheckedRecordings,
     Done,
     Effects,
@@ -29,13 +28,12 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
-    briefly,
     loaded,
-    minor,
     said_of,
     with_logs,
     written,
 )
+from identify.output.machine import briefly
 from twin.errors import InputError
 
 if TYPE_CHECKING:
@@ -180,13 +178,8 @@ def _report(
         after, before = result.final_model, result.model if result.effect else None
     with progress_on_stderr() as progress:
         known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
-    doubts = minor(done.findings)
-    write_report(
-        out,
-        Subject.of(result, title, source=source, machine=known, doubts=doubts),
-        assumed=[line for line in done.findings if ASSUMES in line],
-        faults=[line for line in done.findings if ": error: " in line],
-    )
+    findings = done.findings
+    write_report(out, Subject.of(result, title, source=source, machine=known, findings=findings))
 
 
 @app.command()

@@ -18,11 +18,11 @@ from identify.cli.shared import (
     ModelOption,
     Recordings,
     app,
-    briefly,
     left_out,
     loaded,
     written,
 )
+from identify.output.machine import briefly
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
 

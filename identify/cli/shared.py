@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 import typer
 
 from identify.cli.command import Commands, Said, progress_on_stderr
+from identify.output.machine import briefly
 from twin.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
-ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 app = Commands(
@@ -160,21 +159,6 @@ class CheckedRecordings(Recordings):
                 raise InputError(f"{path}: {finding}; nothing is fitted to it")
             self.findings.append(f"{path}: {finding.severity.value}: {finding}")
         return log
-
-
-def minor(findings: Sequence[str]) -> list[str]:
-    """Warnings that leave an answer its meaning: no errors, nor what an import map assumes."""
-    return [line for line in findings if ": warning: " in line and ASSUMES not in line]
-
-
-def briefly(findings: Sequence[str]) -> list[str]:
-    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them."""
-    folded = minor(findings)
-    counts = Counter(line.partition(": warning: ")[0] for line in folded)
-    return [line for line in findings if line not in folded] + [
-        f"{log}: {n} warning{'s' if n > 1 else ''}; `twin check {log}` tells what to do"
-        for log, n in counts.items()
-    ]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ from strict_json import valid
 
 from identify.cli import main
 from identify.cli.command import OUTPUTS, Command
-from identify.cli.shared import CheckedRecordings, Recordings, app, briefly
+from identify.cli.shared import CheckedRecordings, Recordings, app
+from identify.output.machine import briefly
 from twin.checks import check_log
 from twin.errors import InputError
 from twin.experiments.named import simulate

@@ -8,6 +8,7 @@ from datetime import date
 from pathlib import Path
 
 from identify.dataset.dataset import Role
+from identify.output.machine import ASSUMES
 from identify.output.numbers import quantity
 from identify.output.report import answer, effects, machine, residual
 from identify.output.report.explorer import explored
@@ -34,19 +35,15 @@ SECTIONS = (
 )
 
 
-def write_report(
-    path: Path, subject: Subject, assumed: Sequence[str] = (), faults: Sequence[str] = ()
-) -> None:
+def write_report(path: Path, subject: Subject) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
-
-    assumed, faults: findings of the log check on what import maps assume, and its errors, said
-    first.
 
     One HTML file without outside references: styles, scripts and signals are inside. It appears
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    warnings = [("Assumed", line) for line in assumed] + [("Fault", line) for line in faults]
+    first = (("Assumed", ASSUMES), ("Fault", ": error: "))
+    warnings = [(what, line) for what, mark in first for line in subject.findings if mark in line]
     shown, signals = sections(subject), explored(subject)
     text = whole_page(subject.title, facts(subject), shown, signals, origin(subject), warnings)
     write_atomically(path, text.encode("utf-8"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from identify.dataset.dataset import Role
 from identify.links import WrongBody
+from identify.output.machine import minor
 from identify.output.numbers import Scale, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
@@ -132,5 +133,6 @@ def notes(subject: Subject) -> list[Block]:
     for step in subject.history:
         how = "given the shape found" if step.action == "shape" else "added"
         said += [f"Axis {step.axis}, {spaced(step.effect)} {how}: {note}" for note in step.notes]
-    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in (*said, *subject.doubts)))
+    said += minor(subject.findings)
+    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in said))
     return [Listing(once)] if once else []

@@ -23,8 +23,8 @@ from twin.model.units import AxisUnits
 class Subject:
     """The results that a report shows. history: the effects that were added to the model.
 
-    source: what the page is made of. machine: what the model says of its loop. doubts: warnings of
-    the check that the logs passed.
+    source: what the page is made of. machine: what the model says of its loop. findings: of the
+    check of the logs.
     """
 
     title: str
@@ -34,7 +34,7 @@ class Subject:
     additions: Sequence[Addition] = ()
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
-    doubts: Sequence[str] = ()
+    findings: Sequence[str] = ()
 
     @classmethod
     def of(cls, result: Diagnosis | Comparison, title: str = "", **more: Any) -> Subject:

@@ -182,7 +182,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "diagnosis": lambda: whole(
         made.diagnosed(),
         additions=(made.addition(), made.addition(False)),
-        doubts=("a doubt", "a doubt"),
+        findings=2 * ("run 1: warning: a doubt",),
         machine=OnMachine(worth=made.feedforward()),
     ),
     "diagnosis: laws": lambda: written(subject_of(of_both_laws()), ("equations", "ranking")),

@@ -77,7 +77,7 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
     write_log(case.fit["run 1"], tmp_path / "run 1")
     source = Source("twin diagnose drive.toml 'run 1'", "drive.toml", tmp_path)
     faults, doubts = ["run 1: error: a gap"], ["run 2: warning: the clock jitters"]
-    page = case.write(tmp_path / "r.html", source=source, faults=faults, doubts=doubts)
+    page = case.write(tmp_path / "r.html", source=source, findings=[*faults, *doubts])
     text = Outline(page).text
     assert text.index("Axis x: cogging") < text.rindex("Notes") < text.index(doubts[0])
     assert text.index("Fault") < text.index("run 1: error: a gap") < text.index("Axis x: cogging")
