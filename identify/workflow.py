@@ -32,7 +32,7 @@ from identify.frequency.of_logs import responses_of
 from identify.links import corrected, is_better, suspects_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
-from identify.output.words.addition import axis_in_words, notes_in_words
+from identify.output.words.next_step import axis_in_words, notes_in_words
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     Addition,

@@ -38,7 +38,7 @@ from twin.errors import InputError
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
-    from identify.output.words.plan import Source
+    from identify.output.words.next_step import Source
     from identify.results.results import (
         Addition,
         Comparison,
@@ -156,7 +156,7 @@ def diagnose(
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
     """The command as typed, and what the next one takes over of it."""
-    from identify.output.words.plan import Source
+    from identify.output.words.next_step import Source
 
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
     own = [text for file in effects or () for text in ("--effects", str(file))]

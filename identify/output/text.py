@@ -8,13 +8,6 @@ from typing import TYPE_CHECKING
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, change, number, quantity
-from identify.output.words.addition import (
-    body_in_words,
-    corrected_in_words,
-    errors_of_step,
-    proved_in_words,
-    step_in_words,
-)
 from identify.output.words.diagnosis import (
     all_found,
     named_errors_in_words,
@@ -24,28 +17,35 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.fit import (
+    LOOPS,
     agreement_in_words,
     causes_in_words,
     common_reason,
+    correlation_in_words,
     difference_in_words,
     estimate_in_words,
     fit_in_words,
     motion_fit_in_words,
     nonparametric_in_words,
     over_floor,
+    region_in_words,
 )
-from identify.output.words.plan import (
+from identify.output.words.next_step import (
     UNKNOWN,
     Source,
     all_not_run_in_words,
+    body_in_words,
+    corrected_in_words,
+    errors_of_step,
     experiment_in_words,
     gap_in_words,
     in_order,
     names_of,
+    proved_in_words,
     question_in_words,
+    step_in_words,
     supposed_in_words,
 )
-from identify.output.words.residual import LOOPS, correlation_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
 from identify.results.results import (
     Addition,

@@ -15,7 +15,7 @@ from strict_json import strict, valid
 from identify import workflow
 from identify.output import as_json
 from identify.output import text as as_text
-from identify.output.words.plan import Source
+from identify.output.words.next_step import Source
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import load_experiment
 from twin.experiments.named import simulate

@@ -25,7 +25,7 @@ from identify.output.words.diagnosis import (
     said_of,
     why_not,
 )
-from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
+from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
 from identify.results.results import Addition, CorrectedBody, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis

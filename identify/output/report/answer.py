@@ -8,10 +8,9 @@ from identify.output.machine import minor
 from identify.output.numbers import Scale, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.addition import body_in_words
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
-from identify.output.words.plan import Source, next_step_in_words
+from identify.output.words.next_step import Source, body_in_words, next_step_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

@@ -23,16 +23,17 @@ from identify.output.numbers import (
     quantity,
     spaced,
 )
-from identify.output.words.addition import also_chose_in_words
 from identify.output.words.fit import (
     OUTCOMES,
     aliasing_in_words,
+    dependence_in_words,
     moved_in_words,
     prepared_in_words,
     refit_in_words,
+    repeat_in_words,
+    worst_in_words,
 )
-from identify.output.words.plan import fitted_curves, next_commands
-from identify.output.words.residual import dependence_in_words, repeat_in_words, worst_in_words
+from identify.output.words.next_step import also_chose_in_words, fitted_curves, next_commands
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.candidates import Candidate

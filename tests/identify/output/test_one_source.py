@@ -12,7 +12,7 @@ from report_cases import Case
 from identify import workflow
 from identify.estimation.fit import Outcome, finished
 from identify.output.report.explorer import explored
-from identify.output.words.addition import errors_of_step
+from identify.output.words.next_step import errors_of_step
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.model.file import load_model, save_model

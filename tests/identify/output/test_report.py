@@ -18,7 +18,7 @@ from report_cases import Case, Outline
 from identify.output.report.explorer import coordinate_of_answer, shown_of
 from identify.output.report.page import Chart
 from identify.output.report.residual import regions
-from identify.output.words.plan import Source
+from identify.output.words.next_step import Source
 from identify.results.signals import Signals
 from identify.workflow import on_machine
 from twin.effects import load_catalogue

@@ -17,10 +17,8 @@ from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.experiment_design.missing_excitation import Gap
 from identify.output.numbers import Scale, capitalised, quantity, span, typeset
-from identify.output.words.addition import axis_in_words, notes_in_words
-from identify.output.words.fit import aliasing_in_words, moved_in_words
-from identify.output.words.plan import gap_in_words
-from identify.output.words.residual import place_in_words
+from identify.output.words.fit import aliasing_in_words, moved_in_words, place_in_words
+from identify.output.words.next_step import axis_in_words, gap_in_words, notes_in_words
 from identify.results.results import Addition
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import in_short
