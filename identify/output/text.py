@@ -277,15 +277,13 @@ def agree_text(result: Agreement) -> str:
 
 @html_of.register(FitResult | Comparison | Diagnosis)
 def _tables(result: FitResult | Comparison | Diagnosis) -> str:
-    from identify.output import notebook
+    from identify.output.report import tables
 
-    if isinstance(result, FitResult):
-        return notebook.parameters(result)
-    return notebook.tables(result)
+    return tables(result)
 
 
 @figure_of.register(Comparison | Diagnosis)
 def _picture(result: Comparison | Diagnosis, coordinate: str | None, axis: str | None) -> Figure:
-    from identify.output import notebook
+    from identify.output.report.explorer import residual
 
-    return notebook.residual(result, coordinate, axis)
+    return residual(result, coordinate, axis)
