@@ -189,6 +189,9 @@ PAGES: dict[str, Callable[[], str]] = {
     "diagnosis: no intervals": lambda: written(subject_of(no_intervals()), ("parameters",)),
     **{name: lambda d=result: said_of(d()) for name, result in SAID_OF.items()},
     "comparison by frequency": lambda: written(subject_of(comparison=by_frequency()), ("regions",)),
+    "regions: unexplained": lambda: written(
+        subject_of(TEXTS["diagnosis: unexplained"]()), ("regions",)
+    ),
     "notebook: fit": lambda: notebook(made.fit_result()),
     "notebook: fit, intervals refused": lambda: notebook(TEXTS["fit, intervals refused"]()),
     "notebook: fit of curves": lambda: notebook(
