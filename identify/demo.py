@@ -102,7 +102,6 @@ def demo(
     subject = Subject(
         f"{model.name}: what the model lacks",
         diagnosis,
-        diagnosis.comparison,
         final.history,
         [addition] if addition else [],
         source,

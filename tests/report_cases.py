@@ -10,7 +10,7 @@ from pathlib import Path
 from identify import workflow
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.results import Addition, Diagnosis, summary_of
+from identify.results.results import Addition, Comparison, Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
@@ -38,9 +38,8 @@ class Case:
     def x(self) -> AxisDiagnosis:
         return self.diagnosis.axes["x"]
 
-    def subject(self, diagnosis: Diagnosis | None) -> Subject:
-        history = self.addition.model.history
-        return Subject("Report", diagnosis, self.diagnosis.comparison, history, [self.addition])
+    def subject(self, result: Diagnosis | Comparison) -> Subject:
+        return Subject("Report", result, self.addition.model.history, [self.addition])
 
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""

@@ -178,8 +178,9 @@ def _report(
         after, before = result.final_model, result.model if result.effect else None
     with progress_on_stderr() as progress:
         known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
-    findings = done.findings
-    write_report(out, Subject.of(result, title, source=source, machine=known, findings=findings))
+    history, findings = result.model.history, done.findings
+    subject = Subject(title, result, history, (), source, machine=known, findings=findings)
+    write_report(out, subject)
 
 
 @app.command()

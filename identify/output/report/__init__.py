@@ -83,7 +83,7 @@ def tables(result: FitResult | Comparison | Diagnosis) -> str:
         return fragment(_fitted(result))
     shown = ("answer", "found", "regions", "parameters", "logs")
     blocks: list[Block] = []
-    for section in sections(Subject.of(result), [p for p in SECTIONS if p.anchor in shown]):
+    for section in sections(Subject("", result), [p for p in SECTIONS if p.anchor in shown]):
         blocks += [Heading(section.title)] if section.anchor != "answer" else []
         blocks += [block for block in section.blocks if not isinstance(block, Chart)]
     return fragment(blocks)

@@ -186,7 +186,7 @@ def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str |
     """The residual without and with what was found, as dots and as means over a coordinate."""
     import matplotlib.pyplot as plt
 
-    views = {view.name: view for view in Subject.of(result).views}
+    views = {view.name: view for view in Subject("", result).views}
     if axis is not None and axis not in views:
         raise InputError(f"no axis '{axis}' in the result; it has {', '.join(views)}")
     view = views[axis] if axis else next(iter(views.values()))

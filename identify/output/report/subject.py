@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, all_found, said_of
@@ -21,27 +20,27 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """The results that a report shows. history: the effects that were added to the model.
+    """What a report shows: a result, and the effects that were added to its model (history).
 
     source: what the page is made of. machine: what the model says of its loop. findings: of the
     check of the logs.
     """
 
     title: str
-    diagnosis: Diagnosis | None
-    comparison: Comparison
+    result: Diagnosis | Comparison
     history: Sequence[HistoryStep] = ()
     additions: Sequence[Addition] = ()
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
     findings: Sequence[str] = ()
 
-    @classmethod
-    def of(cls, result: Diagnosis | Comparison, title: str = "", **more: Any) -> Subject:
-        """The subject of a report of one result; more: fields of it."""
-        diagnosis = result if isinstance(result, Diagnosis) else None
-        comparison = result.comparison if isinstance(result, Diagnosis) else result
-        return cls(title, diagnosis, comparison, result.model.history, **more)
+    @property
+    def diagnosis(self) -> Diagnosis | None:
+        return self.result if isinstance(self.result, Diagnosis) else None
+
+    @property
+    def comparison(self) -> Comparison:
+        return self.result.comparison if isinstance(self.result, Diagnosis) else self.result
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:

@@ -33,14 +33,14 @@ SAID = ("answer", "found", "law-shape", "notes")  # sections that a diagnosis al
 ONE = replace(made.FOUND[0], tied=())
 
 
-def subject_of(diagnosis: Diagnosis | None = None, **changes: object) -> Subject:
-    """The subject of a report of built results."""
-    given = Subject("The <title>", diagnosis, made.compared(), made.STEPS)
+def subject_of(result: Diagnosis | Comparison | None = None, **changes: object) -> Subject:
+    """The subject of a report of a built result."""
+    given = Subject("The <title>", result or made.compared(), made.STEPS)
     return replace(given, **changes)
 
 
-def whole(diagnosis: Diagnosis | None = None, **changes: object) -> str:
-    return written(subject_of(diagnosis, **changes))
+def whole(result: Diagnosis | Comparison | None = None, **changes: object) -> str:
+    return written(subject_of(result, **changes))
 
 
 def written(subject: Subject, anchors: tuple[str, ...] = ()) -> str:
@@ -53,8 +53,8 @@ def written(subject: Subject, anchors: tuple[str, ...] = ()) -> str:
 def said_of(found: Diagnosis) -> str:
     """What a page says of a diagnosis alone."""
     axes = {name: c for name, c in found.comparison.axes.items() if name in found.axes}
-    compared = replace(found.comparison, axes=axes)
-    return written(subject_of(found, comparison=compared, history=()), SAID)
+    shown = replace(found, comparison=replace(found.comparison, axes=axes))
+    return written(subject_of(shown, history=()), SAID)
 
 
 def notebook(result: Printed) -> str:
@@ -103,7 +103,7 @@ def of_a_curve() -> str:
     axis = axis_of(fitted("empirical_map"))
     model = replace(made.MODEL, axes={"x": axis})
     compared = Comparison(model, {"x": made.comparison_of()})
-    return written(subject_of(comparison=compared), ("equations", "parameters"))
+    return written(subject_of(compared), ("equations", "parameters"))
 
 
 def no_intervals() -> Diagnosis:
@@ -172,9 +172,9 @@ RISING = replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713)
 FALLING = replace(made.STEPS[2], fit_error_before=0.723, fit_error_after=0.0331)
 PAGES: dict[str, Callable[[], str]] = {
     "comparison": whole,
-    "comparison at the noise floor": lambda: whole(comparison=of_error(1.29), history=()),
-    "comparison above the noise floor": lambda: whole(comparison=of_error(1.31), history=()),
-    "comparison of a quiet axis": lambda: whole(comparison=quiet_beside(), history=()),
+    "comparison at the noise floor": lambda: whole(of_error(1.29), history=()),
+    "comparison above the noise floor": lambda: whole(of_error(1.31), history=()),
+    "comparison of a quiet axis": lambda: whole(quiet_beside(), history=()),
     "comparison of a curve": of_a_curve,
     "errors in the unit of the largest": lambda: written(
         subject_of(history=(RISING, FALLING)), ("growth",)
@@ -188,7 +188,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "diagnosis: laws": lambda: written(subject_of(of_both_laws()), ("equations", "ranking")),
     "diagnosis: no intervals": lambda: written(subject_of(no_intervals()), ("parameters",)),
     **{name: lambda d=result: said_of(d()) for name, result in SAID_OF.items()},
-    "comparison by frequency": lambda: written(subject_of(comparison=by_frequency()), ("regions",)),
+    "comparison by frequency": lambda: written(subject_of(by_frequency()), ("regions",)),
     "regions: unexplained": lambda: written(
         subject_of(TEXTS["diagnosis: unexplained"]()), ("regions",)
     ),

@@ -156,7 +156,9 @@ def test_the_last_band_of_frequency_is_as_wide_as_it_is(case: Case) -> None:
 
 
 def test_a_comparison_alone_has_one_residual(case: Case, tmp_path: Path) -> None:
-    (axis,) = signals_in(case.write(tmp_path / "c.html", diagnosis=None, additions=()))
+    (axis,) = signals_in(
+        case.write(tmp_path / "c.html", result=case.diagnosis.comparison, additions=())
+    )
     assert axis["residuals"] == ["before"]
     assert axis["texts"]["model_before"] == "model"
     assert axis["texts"]["band"].startswith("the noise floor, ±")

@@ -37,7 +37,7 @@ def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
     diagnosis = workflow.diagnose(model, logs, case.held, catalogue=catalogue)
     step = replace(case.addition.step, effect=own.name, notes=(evil,))
     page = case.write(
-        tmp_path / "evil.html", title=evil, diagnosis=diagnosis, comparison=diagnosis.comparison,
+        tmp_path / "evil.html", title=evil, result=diagnosis,
         history=[step], additions=(),
     )  # fmt: skip
     outline = Outline(page)
