@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 from identify.cli.command import Said, progress_on_stderr, require_apart
 from identify.cli.shared import (
@@ -67,7 +68,7 @@ def fit(
     out: Annotated[Path | None, written("Fitted model to write.")] = None,
     objective: Annotated[
         Objective,
-        typer.Option(
+        Option(
             help="What is brought near the measurement: the force along the measured "
             "motion, or the motion simulated from the command alone."
         ),
@@ -104,7 +105,7 @@ def compare(
     html: Report = None,
     mcap: Annotated[
         Path | None,
-        typer.Option(help="The first log measured, modelled and their difference, as MCAP."),
+        Option(help="The first log measured, modelled and their difference, as MCAP."),
     ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
@@ -185,19 +186,19 @@ def _report(
 
 @app.command()
 def add(
-    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name from `twin effects`.")],
+    effect: Annotated[str, Argument(metavar="EFFECT", help="Name from `twin effects`.")],
     model: Model,
     logs: FitLogs,
     out: Annotated[Path, written("Model with the effect.")],
     holdout: Holdout = None,
     test: Test = None,
     axis: Annotated[
-        str | None, typer.Option(help="Axis; the one that it improves most if left out.")
+        str | None, Option(help="Axis; the one that it improves most if left out.")
     ] = None,
     test_function: TestFunction = None,
     shape: Annotated[
         bool,
-        typer.Option("--shape", help="The model has the effect: give its law the shape found."),
+        Option("--shape", help="The model has the effect: give its law the shape found."),
     ] = False,
     effects: Effects = None,
 ) -> Said:
@@ -240,13 +241,13 @@ def _copy_of(machine: MachineModel, out: Path) -> Path:
 
 @app.command()
 def agree(
-    a: Annotated[str, typer.Argument(metavar="A", help="Fitted model (.toml).")],
+    a: Annotated[str, Argument(metavar="A", help="Fitted model (.toml).")],
     b: Annotated[
-        str, typer.Argument(metavar="B", help="Fitted model (.toml), or what `twin export` wrote.")
+        str, Argument(metavar="B", help="Fitted model (.toml), or what `twin export` wrote.")
     ],
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
+        Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
     ] = None,
     effects: Effects = None,
 ) -> Said:
@@ -283,9 +284,7 @@ def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Pa
 def feedforward(
     model: Model,
     logs: Logs,
-    before: Annotated[
-        str | None, typer.Option("--before", help="Model to compare with (.toml).")
-    ] = None,
+    before: Annotated[str | None, Option("--before", help="Model to compare with (.toml).")] = None,
     effects: Effects = None,
 ) -> Said:
     """Tell what the model is worth as feedforward: the tracking error with it, in simulation.
@@ -305,14 +304,10 @@ def feedforward(
 def frf(
     logs: Annotated[
         list[str],
-        typer.Argument(
-            metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."
-        ),
+        Argument(metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."),
     ],
     out: Annotated[Path | None, written("The responses to write (.csv, .mcap).")] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Bode diagram to write (.png, .svg, .pdf).")
-    ] = None,
+    plot: Annotated[Path | None, Option(help="Bode diagram to write (.png, .svg, .pdf).")] = None,
     effects: Effects = None,
 ) -> Said:
     """Tell the frequency response of force to position: mass, resonances, delay, margins.
@@ -346,14 +341,14 @@ def frf(
 def plan(
     model: Model,
     logs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[LOG...]", help="Existing MCAP logs.")
+        list[Path] | None, Argument(metavar="[LOG...]", help="Existing MCAP logs.")
     ] = None,
     between: Annotated[
         tuple[str, str] | None,
-        typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
+        Option(help="Two effects to add to the model, or two fitted models (.toml)."),
     ] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
-    duration: Annotated[float, typer.Option(help="Length of the experiment in s.")] = 20.0,
+    axis: Annotated[str | None, Option(help="Axis to be explained.")] = None,
+    duration: Annotated[float, Option(help="Length of the experiment in s.")] = 20.0,
     out: Annotated[Path, written("Experiment to write (.toml).")] = Path("experiment.toml"),
     holdout: Holdout = None,
     test_function: TestFunction = None,
@@ -400,7 +395,7 @@ def _rival(name: str, catalogue: Catalogue) -> Rival:
 def demo(
     ctx: typer.Context,
     folder: Annotated[Path, written("Folder to write into.")] = Path("demo"),
-    seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
+    seed: Annotated[int, Option(help="Draws the machine and its hidden effect.")] = 2,
     model: ModelOption = "proton_xy",
     effects: Effects = None,
 ) -> Said:

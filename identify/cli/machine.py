@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from identify.cli.command import Said, progress_on_stderr
 from identify.cli.shared import (
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 @app.command()
 def simulate(
     experiment: Annotated[
-        str, typer.Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
+        str, Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
     ],
     model: ModelOption = "proton_xy",
     out: Annotated[Path, written("MCAP log to write.")] = Path("log.mcap"),
-    seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
+    seed: Annotated[int, Option(help="Same seed, same log.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(help="Length in s, 20 if left out; a file has its own.")
+        float | None, Option(help="Length in s, 20 if left out; a file has its own.")
     ] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
+    axis: Annotated[str | None, Option(help="Axis that moves, where one does.")] = None,
     setpoints: Annotated[
         Path | None,
-        typer.Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
+        Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
     ] = None,
     effects: Effects = None,
 ) -> Said:
@@ -85,15 +85,13 @@ def simulate(
 def import_(
     sources: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
+        Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
     ],
     mapping: Annotated[
-        Path | None, typer.Option("--map", help="Columns, units, scale, sign, rate.")
+        Path | None, Option("--map", help="Columns, units, scale, sign, rate.")
     ] = None,
     out: Annotated[Path | None, written("MCAP log to write; or the map.")] = None,
-    guess: Annotated[
-        bool, typer.Option("--guess", help="Propose a map for FILE, with reasons.")
-    ] = False,
+    guess: Annotated[bool, Option("--guess", help="Propose a map for FILE, with reasons.")] = False,
 ) -> Said:
     """Turn a machine's recording into an MCAP log.
 
@@ -141,7 +139,7 @@ def new(
     out: Annotated[Path, written("Machine model (.toml) to write.")],
     mjcf: Annotated[
         Path | None,
-        typer.Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
+        Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
     ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
@@ -218,10 +216,10 @@ def check(logs: Logs) -> Said:
 
 @app.command()
 def recover(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Damaged MCAP log.")],
+    log: Annotated[Path, Argument(metavar="LOG", help="Damaged MCAP log.")],
     out: Annotated[Path, written("MCAP log of what is intact.")],
     unproved: Annotated[
-        bool, typer.Option("--unproved", help="Keep samples that no checksum proves as well.")
+        bool, Option("--unproved", help="Keep samples that no checksum proves as well.")
     ] = False,
 ) -> Said:
     """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
@@ -240,13 +238,13 @@ def recover(
 
 @app.command()
 def effects(
-    name: Annotated[str | None, typer.Argument(help="One effect in full.")] = None,
+    name: Annotated[str | None, Argument(help="One effect in full.")] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw what the effect leaves in the force (.png, .svg).")
+        Path | None, Option(help="Draw what the effect leaves in the force (.png, .svg).")
     ] = None,
     files: Effects = None,
     check_: Annotated[
-        bool, typer.Option("--check", help="Run the laws that every effect obeys.")
+        bool, Option("--check", help="Run the laws that every effect obeys.")
     ] = False,
 ) -> Said:
     """Print the catalogue, or one effect with its equation, units and source; or check it.
@@ -288,10 +286,10 @@ def effects(
 @app.command()
 def export(
     model: Model,
-    to: Annotated[str, typer.Option("--to", help=f"{', '.join(format_names())}.")],
+    to: Annotated[str, Option("--to", help=f"{', '.join(format_names())}.")],
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
+        Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
     ] = None,
     folder: Annotated[Path, written("Folder, or the only file.")] = Path("export"),
     effects: Effects = None,
@@ -321,9 +319,7 @@ def export(
 
 @app.command()
 def example(
-    name: Annotated[
-        str | None, typer.Argument(help="Which example; all are listed if left out.")
-    ] = None,
+    name: Annotated[str | None, Argument(help="Which example; all are listed if left out.")] = None,
     folder: Annotated[Path | None, written("New folder; NAME if left out.")] = None,
 ) -> Said:
     """Write an example with its data and the commands to type, or list the examples.
@@ -348,7 +344,7 @@ def example(
 
 Gain = Annotated[
     float | None,
-    typer.Option(
+    Option(
         metavar="TIMES",
         help="How many times larger than they are the differences to the measured motion are "
         "drawn; chosen so that they are seen if left out.",
@@ -358,19 +354,19 @@ Gain = Annotated[
 
 @app.command()
 def view(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP log.")],
+    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
     model: Annotated[
         str | None,
-        typer.Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
+        Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Page to write, which replays it in any browser.")
+        Path | None, Option(help="Page to write, which replays it in any browser.")
     ] = None,
-    video: Annotated[Path | None, typer.Option(help="MP4 to write, without a display.")] = None,
+    video: Annotated[Path | None, Option(help="MP4 to write, without a display.")] = None,
     rerun: Annotated[
-        Path | None, typer.Option(help="Recording (.rrd) to write, for the viewer of Rerun.")
+        Path | None, Option(help="Recording (.rrd) to write, for the viewer of Rerun.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="Speed of the replay; 1 is real time.")] = 1.0,
+    speed: Annotated[float, Option(help="Speed of the replay; 1 is real time.")] = 1.0,
     gain: Gain = None,
     effects: Effects = None,
 ) -> Said:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 import typer
+from typer import Argument, Option
 
 from identify.cli.command import Commands, Said, progress_on_stderr
 from identify.output.machine import briefly
@@ -33,30 +34,30 @@ app = Commands(
 
 def written(what: str) -> Any:
     """The option -o of a command, with its help."""
-    return typer.Option("--out", "-o", help=what)
+    return Option("--out", "-o", help=what)
 
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs.")]
-FitLogs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
-ModelOption = Annotated[str, typer.Option("--model", help="Machine model (.toml).")]
+Logs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs.")]
+FitLogs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs to fit on.")]
+Model = Annotated[str, Argument(metavar="MODEL", help="Machine model (.toml).")]
+ModelOption = Annotated[str, Option("--model", help="Machine model (.toml).")]
 Holdout = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         help="Selection logs (MCAP), one or several: no parameter is fitted on them, but they take "
         "part in the choice of effects.",
     ),
 ]
 Test = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         help="Test logs (MCAP), one or several, on which nothing is decided: they give the error "
         "that is reported.",
     ),
 ]
 TestFunction = Annotated[
     float | None,
-    typer.Option(
+    Option(
         metavar="SECONDS",
         help="Length of the test functions, the time scale of the residual; from the noise if "
         "left out.",
@@ -65,7 +66,7 @@ TestFunction = Annotated[
 Report = Annotated[Path | None, written("HTML report.")]
 Effects = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         "--effects", help="Your own effect files, one or several; loading them runs their code."
     ),
 ]
@@ -82,7 +83,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def front_door(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Find out why the model and the machine disagree."""
