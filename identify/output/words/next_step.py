@@ -18,7 +18,7 @@ from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.links import INERTIAL, LINK_MASS, WrongBody
 from identify.output.numbers import Scale, arrow, listed, number, percent, quantity, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
-from identify.results.results import Addition, CorrectedBody, Diagnosis
+from identify.results.results import Addition, Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import load_catalogue
 from twin.experiments.file import in_short
@@ -202,13 +202,6 @@ def all_not_run_in_words(not_run: Sequence[NotRun]) -> list[str]:
 # --- what is added to a model ---------------------------------------------------------------------
 
 
-def step_in_words(step: HistoryStep) -> str:
-    """What was done to a model: "added cogging to axis x"."""
-    if step.action == "shape":
-        return f"gave {step.effect} of axis {step.axis} the shape that the logs show"
-    return f"added {step.effect} to axis {step.axis}"
-
-
 def errors_of_step(step: HistoryStep) -> dict[Role, tuple[float, float]]:
     """Errors before and after a step, on the logs of each role that there were."""
     pairs = {
@@ -221,17 +214,6 @@ def errors_of_step(step: HistoryStep) -> dict[Role, tuple[float, float]]:
         for role, (before, after) in pairs.items()
         if before is not None and after is not None
     }
-
-
-def proved_in_words(made: Addition) -> str:
-    """Whether the logs prove what was added."""
-    if made.kept:
-        return "The logs prove the effect."
-    return (
-        f"The logs do not prove it: {made.candidate.refused}. The model has it nevertheless, as "
-        "asked for; go on with the model before, or, if a diagnosis says that it needs another "
-        "beside it, add that to the new model and judge then."
-    )
 
 
 def axis_in_words(
@@ -293,13 +275,6 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
     filled = source.filled(command, names_of(next(iter(result.axes.values())).dataset))
     written = inertial(*found.element)
     return [*said, f"Next: {filled} writes {written} into the body, in a copy of {file}."]
-
-
-def corrected_in_words(result: CorrectedBody) -> list[str]:
-    """What was written, why, and what it did to the errors."""
-    found, written, given = result.body, result.model.mjcf_name, result.given.mjcf_name
-    said = f"Body {found.body} of {written} has {result.element}; {given} is as it was."
-    return [said, *wrong_body_in_words(found, result.given)]
 
 
 def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
