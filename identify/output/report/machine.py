@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from identify.frequency.of_logs import AxisFrequency, Shown
+from identify.frequency.of_logs import AxisFrequency
 from identify.output.frequency import read_off
 from identify.output.numbers import NOTHING, pretty, quantity
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView
+from identify.results.frequency import by_source
 
 
 def responses(view: AxisView) -> list[Block]:
@@ -20,18 +21,15 @@ def responses(view: AxisView) -> list[Block]:
     return [*_bode(found), _table(found)]
 
 
-def _shown(found: AxisFrequency) -> list[tuple[str, Shown, Ink]]:
-    """What is drawn: the model's response is of the same frequencies as the measured one."""
-    model = [("model", found.modelled, Ink.AFTER)] if found.modelled else []
-    return [("measured", found.measured, Ink.INK), *model]
-
-
 def _bode(found: AxisFrequency) -> list[Chart]:
-    """Magnitude and phase of each response, at the frequencies at which one tells something."""
-    shown = _shown(found)
-    told = np.any([one.response.tells for _, one, _ in shown], axis=0)
+    """Magnitude and phase of each response, at the frequencies at which one tells something.
+
+    The model's is of the same frequencies as the measured one.
+    """
+    shown = by_source(found)
+    told = np.any([one.response.tells for one in shown.values()], axis=0)
     sizes, phases = [], []
-    for name, one, ink in shown:
+    for (name, one), ink in zip(shown.items(), (Ink.INK, Ink.AFTER), strict=False):
         response, band = one.response, f"{name}, 90 % band"
         plant = np.where(response.tells, response.plant, np.nan)[told]
         size, half = np.abs(plant), response.band[told]
@@ -53,7 +51,7 @@ def _bode(found: AxisFrequency) -> list[Chart]:
 
 def _table(found: AxisFrequency) -> Table:
     """What is read off each, side by side."""
-    told = {name: dict(read_off(shown, found)) for name, shown, _ in _shown(found)}
+    told = {name: dict(read_off(shown, found)) for name, shown in by_source(found).items()}
     rows = dict.fromkeys(name for facts in told.values() for name in facts)
     titles = ("Read off, with 90 % band", *(name.capitalize() for name in told))
     cells = [(row, *(facts.get(row, NOTHING) for facts in told.values())) for row in rows]
