@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import get_type_hints
@@ -33,7 +32,6 @@ from twin.logs import AxisLog, Log, read_log, write_log
 from twin.model.file import load_model, models_folder, save_model
 from twin.model.machine import MachineModel
 
-Cli = Callable[..., tuple[int, str, str]]
 STAGE = (models_folder() / "proton_xy.toml").read_text()
 
 
@@ -59,16 +57,6 @@ def folder(recorded, tmp_path) -> Path:
     narrow = STAGE.replace("travel = [-0.17, 0.17]", "travel = [0.17, -0.17]")
     (tmp_path / "narrow.toml").write_text(narrow)
     return tmp_path
-
-
-@pytest.fixture
-def cli(tmp_path) -> Cli:
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        done = twin(*arguments, folder=tmp_path)
-        return done.returncode, done.stdout, done.stderr
-
-    return run
 
 
 @pytest.mark.parametrize(
@@ -110,20 +98,19 @@ def test_far_names_are_not_suggested(folder):
         (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
     ],
 )
-def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, said):
+def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, tmp_path, error, said):
     def fails(*_: object) -> None:
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
     monkeypatch.setattr("twin.effects.load_catalogue", fails)
-    code, out, err = cli("effects", "--json")
+    done = twin("effects", "--json", folder=tmp_path)
     interrupted = isinstance(error, KeyboardInterrupt)
-    assert code == (130 if interrupted else 2)
-    assert err.startswith(said)
-    assert err.count("\n") == 1
-    assert (valid(json.loads(out)) if out else None) == (
-        None if interrupted else {"error": err[6:-1]}
-    )
+    assert done.returncode == (130 if interrupted else 2)
+    assert done.stderr.startswith(said)
+    assert done.stderr.count("\n") == 1
+    told = valid(json.loads(done.stdout)) if done.stdout else None
+    assert told == (None if interrupted else {"error": done.stderr[6:-1]})
     if type(error) is ValueError:
         monkeypatch.setenv("TWIN_TRACEBACK", "1")
         monkeypatch.setattr(sys, "argv", ["twin", "effects"])
@@ -144,10 +131,8 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
         ("diagnose m a -o a.pdf", "a.pdf: a report is an .html file; give such a name"),
     ],
 )
-def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
-    code, out, err = cli(*shlex.split(command))
-    assert (code, out) == (2, "")
-    assert said in err
+def test_what_cannot_be_written_is_said_before_the_work(tmp_path, command, said):
+    assert said in refusal(*shlex.split(command), folder=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -170,17 +155,13 @@ def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
         ("demo --model better.toml -o .", "read as --model"),
     ],
 )
-def test_no_command_overwrites_what_it_reads(cli, tmp_path, command, said):
+def test_no_command_overwrites_what_it_reads(tmp_path, command, said):
     for name in ("a", "better.toml"):
         (tmp_path / name).write_text("whole")
     (tmp_path / "link").symlink_to("a")
     (tmp_path / "hard").hardlink_to(tmp_path / "a")
-    before = sorted(tmp_path.iterdir())
-    code, out, err = cli(*command.split())
-    assert (code, out) == (2, "")
-    assert said in err
+    assert said in refusal(*command.split(), folder=tmp_path)
     assert (tmp_path / "a").read_text() == (tmp_path / "better.toml").read_text() == "whole"
-    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_every_path_of_a_command_is_known_as_read_or_written():
@@ -192,16 +173,18 @@ def test_every_path_of_a_command_is_known_as_read_or_written():
     assert paths == {*read, *OUTPUTS}
 
 
-def test_help_is_where_it_is_looked_for(cli):
-    assert cli("fit")[2] == "twin: Missing argument 'MODEL'. See `twin fit --help`.\n"
-    assert cli("simulat")[2].endswith("See `twin --help`.\n")
+def test_help_is_where_it_is_looked_for(tmp_path):
+    wrong = refusal("fit", folder=tmp_path), refusal("simulat", folder=tmp_path)
+    assert wrong[0] == "twin: Missing argument 'MODEL'. See `twin fit --help`."
+    assert wrong[1].endswith("See `twin --help`.")
     for command, fits in (("fit", True), ("compare", False), ("check", False), ("new", False)):
-        assert ("MCAP logs to fit on." in cli(command, "--help")[1]) is fits
-    code, out, err = cli()
-    assert (code, err) == (0, "")
-    assert out.count("\n") > 10
-    assert "diagnose" in out
-    assert "selftest" not in out
+        asked = twin(command, "--help", folder=tmp_path).stdout
+        assert ("MCAP logs to fit on." in asked) is fits
+    done = twin(folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("\n") > 10
+    assert "diagnose" in done.stdout
+    assert "selftest" not in done.stdout
 
 
 def test_a_truncated_log_is_recovered_diagnosed_and_no_effect_added(folder):
