@@ -60,7 +60,7 @@ def _stages(work: Workload, name: str, files: list[Path]) -> list[Figure]:
     result = _diagnosed(work, logs, spent)
     with TemporaryDirectory() as folder:
         out = Path(folder, "report.html")
-        _timed(spent, "report", write_report)(out, Subject("", result, result.comparison))
+        _timed(spent, "report", write_report)(out, Subject("", result))
     return [
         Figure(
             f"{name} hidden: {stage}", work.in_passes(sum(seconds)), "passes",

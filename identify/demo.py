@@ -16,7 +16,7 @@ from identify.experiment_design.planting import draw_effect, hidden_part, other_
 from identify.output.numbers import quantity
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.output.words.plan import Source
+from identify.output.words.next_step import Source
 from identify.results.results import Addition, Diagnosis, Feedforward, OnMachine
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
@@ -102,7 +102,6 @@ def demo(
     subject = Subject(
         f"{model.name}: what the model lacks",
         diagnosis,
-        diagnosis.comparison,
         final.history,
         [addition] if addition else [],
         source,

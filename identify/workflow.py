@@ -17,11 +17,11 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import sticks
 from identify.estimation.alignment import aligned, fit_aligned
-from identify.estimation.confounded import Refit, refit
+from identify.estimation.confounded import refit
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.free_curves import having_shape
-from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
+from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
@@ -32,7 +32,7 @@ from identify.frequency.of_logs import responses_of
 from identify.links import corrected, is_better, suspects_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
-from identify.output.words.addition import axis_in_words, notes_in_words
+from identify.output.words.next_step import axis_in_words, notes_in_words
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     Addition,
@@ -103,11 +103,7 @@ def fit(
     model, logs, holdout, test = _given(model, logs, holdout, test, catalogue)
     found, given = datasets(model, logs, holdout, test_function, test), model
     known = Catalogue([]) if catalogue is None else usable(catalogue, given)
-    fits: dict[str, Fit] = {}
-    intervals: dict[str, tuple[Estimate, ...]] = {}
-    refits: dict[str, Refit] = {}
-    held: dict[str, float | None] = {}
-    tested: dict[str, float | None] = {}
+    fits, intervals, refits, held, tested = {}, {}, {}, {}, {}
     for i, (axis, dataset) in enumerate([*found.items()]):
         progress("fitting", i, len(found))
         found[axis], fits[axis] = dataset, done = _fitted(given.axes[axis], dataset)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import numpy as np
-from built_fits import CATALOGUE, PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
+from built_fits import PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
 from identify.dataset.dataset import Role
 from identify.estimation.confounded import Change, MovedParameter, Refit
@@ -25,6 +24,7 @@ from identify.results.results import (
     AxisSummary,
     Comparison,
     Diagnosis,
+    Feedforward,
     FitResult,
     SimulationFit,
 )
@@ -34,6 +34,7 @@ from identify.selection.findings import Finding
 from identify.validation.agreement import AxisAgreement, Cause, Difference
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import MisfitMap, Region
+from identify.validation.tracking import AxisTracking, TrackingError
 from identify.validation.whiteness import Correlation, Loop, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel
@@ -165,9 +166,7 @@ SIGNALS = ("residual", "command", "speed")
 def whiteness_of(o: float = 0.0) -> ResidualTests:
     edges = np.linspace(-0.5, 0.5, 6) + o
     density = np.array([0.1, 0.9, 2.3, 1.1, 0.6]) + o
-    made = tuple(
-        correlation(n, o + i / 1e3) for i, n in enumerate(("residual", "command", "speed"))
-    )
+    made = tuple(correlation(n, o + i / 1e3) for i, n in enumerate(SIGNALS))
     return ResidualTests(Loop.OPEN, 387, 0.0737 + o, edges, density, 0.883 - o, made)
 
 
@@ -305,60 +304,8 @@ def addition(kept: bool = True) -> Addition:
     )
 
 
-class Page(HTMLParser):
-    """A page's sections: headings, tables as rows of cells, and facts by name."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.sections: dict[str, list[list[list[str]]]] = {}
-        self.texts: dict[str, str] = {}
-        self.pairs: list[tuple[str, str]] = []
-        self.tones: dict[str, list[str]] = {}
-        self._anchor, self._tag, self._cell = "", "", None
-        self.feed(page)
-
-    def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        if tag == "section":
-            self._anchor = given["id"]
-            self.sections[self._anchor], self.texts[self._anchor] = [], ""
-            self.tones[self._anchor] = []
-        elif tag == "table":
-            self.sections[self._anchor].append([])
-        elif tag == "tr":
-            self.sections[self._anchor][-1].append([])
-            self.tones[self._anchor].append(given.get("class", "head"))
-        elif tag in ("th", "td"):
-            self.sections[self._anchor][-1][-1].append("")
-            self._cell = self.sections[self._anchor][-1][-1]
-        elif tag in ("dt", "dd"):
-            self.pairs.append((tag, ""))
-        self._tag = tag
-
-    def handle_endtag(self, tag):
-        if tag in ("th", "td"):
-            self._cell = None
-        self._tag = ""
-
-    def handle_data(self, data):
-        if self._cell is not None:
-            self._cell[-1] += data
-        if self._anchor:
-            self.texts[self._anchor] += data
-        if self._tag in ("dt", "dd"):
-            self.pairs[-1] = (self._tag, self.pairs[-1][1] + data)
-
-    @property
-    def facts(self) -> dict[str, str]:
-        """Named facts, the last of each name."""
-        names = [text for tag, text in self.pairs if tag == "dt"]
-        values = [text for tag, text in self.pairs if tag == "dd"]
-        return dict(zip(names, values, strict=True))
-
-    def table(self, anchor: str, index: int = 0) -> dict[str, dict[str, str]]:
-        """A table as row label -> column title -> cell."""
-        (_, *titles), *rows = self.sections[anchor][index]
-        return {row[0]: dict(zip(titles, row[1:], strict=True)) for row in rows}
-
-
-__all__ = ["CATALOGUE", "Page"]
+def feedforward() -> Feedforward:
+    """Of a model whose static friction no feedforward holds."""
+    every = (TrackingError(o * 1e-6, 3.1 * o * 1e-6) for o in (9.7, 4.3, 1.9))
+    found = AxisTracking(*every, {"cogging": 2.3e-6, "lugre": 7.1e-7})
+    return Feedforward(MODEL, MODEL, ("run 1", "run 2"), {"x": found})

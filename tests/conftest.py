@@ -30,7 +30,7 @@ LONGEST = (
     "test_laws_units",
     "test_chapters",
     "test_one_dataset",
-    "test_laws_command_line",
+    "test_command_line",
     "test_plan",
     "test_search",
     "test_machines",

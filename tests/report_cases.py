@@ -7,13 +7,10 @@ from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
-import built_results as made
-
 from identify import workflow
-from identify.output.report import SECTIONS, facts, sections, write_report
-from identify.output.report.page import page
+from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.results import Addition, Diagnosis, summary_of
+from identify.results.results import Addition, Comparison, Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.named import simulate
@@ -41,9 +38,8 @@ class Case:
     def x(self) -> AxisDiagnosis:
         return self.diagnosis.axes["x"]
 
-    def subject(self, diagnosis: Diagnosis | None) -> Subject:
-        history = self.addition.model.history
-        return Subject("Report", diagnosis, self.diagnosis.comparison, history, [self.addition])
+    def subject(self, result: Diagnosis | Comparison) -> Subject:
+        return Subject("Report", result, self.addition.model.history, [self.addition])
 
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""
@@ -59,9 +55,8 @@ class Case:
         )  # fmt: skip
 
     def write(self, path: Path, **changes: object) -> str:
-        said = {name: changes.pop(name) for name in ("assumed", "faults") if name in changes}
         subject = replace(self.subject(self.diagnosis), **changes)  # type: ignore[arg-type]
-        write_report(path, subject, **said)  # type: ignore[arg-type]
+        write_report(path, subject)
         return path.read_text(encoding="utf-8")
 
 
@@ -119,19 +114,3 @@ class Outline(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         self.text += "" if self._apart else data
-
-
-TABLES = ("answer", "regions", "ranking", "growth", "equations", "parameters", "logs", "notes")
-
-
-def subject_of(
-    diagnosis: Diagnosis | None = None, *, history=made.STEPS, additions=(), **changes: object
-) -> Subject:
-    """The subject of a report of built results."""
-    return Subject("The title", diagnosis, made.compared(), history, additions, **changes)
-
-
-def page_of(subject: Subject, anchors: tuple[str, ...] = TABLES) -> made.Page:
-    """Its page with these sections, read back."""
-    shown = sections(subject, [part for part in SECTIONS if part.anchor in anchors])
-    return made.Page(page(subject.title, facts(subject), shown))

@@ -62,7 +62,8 @@ def main() -> None:
         if hasattr(error, "format_message"):  # a usage error; its class moves between versions
             said = error.format_message()
             end = "" if said.endswith((".", "?")) else "."
-            code = fail(f"{said}{end} See `{_command_of(error)} --help`.")
+            used = getattr(error, "ctx", None)
+            code = fail(f"{said}{end} See `{used.command_path if used else 'twin'} --help`.")
         elif "TWIN_TRACEBACK" in os.environ:
             raise
         else:
@@ -88,11 +89,6 @@ def _require_no_empty(arguments: Sequence[str]) -> None:
     if "" in arguments:
         place = arguments.index("")
         raise InputError(" ".join([*arguments[:place][-1:], "'': is empty; give a name"]))
-
-
-def _command_of(error: Any) -> str:
-    """The command that was used wrongly, as a user calls it."""
-    return error.ctx.command_path if getattr(error, "ctx", None) else "twin"
 
 
 def fail(message: str) -> int:

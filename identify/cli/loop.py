@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 from identify.cli.command import Said, progress_on_stderr, require_apart
 from identify.cli.shared import (
-    ASSUMES,
     CheckedRecordings,
+    Done,
     Effects,
     FitLogs,
     Holdout,
@@ -28,25 +29,23 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
-    briefly,
     loaded,
-    meaningless,
-    minor,
     said_of,
     with_logs,
+    written,
 )
+from identify.output.machine import briefly
 from twin.errors import InputError
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
-    from identify.output.words.plan import Source
+    from identify.output.words.next_step import Source
     from identify.results.results import (
         Addition,
         Comparison,
         CorrectedBody,
         Diagnosis,
         FitResult,
-        OnMachine,
         SimulationFit,
     )
     from twin.effects import Catalogue
@@ -66,10 +65,10 @@ def fit(
     logs: FitLogs,
     holdout: Holdout = None,
     test: Test = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Fitted model to write.")] = None,
+    out: Annotated[Path | None, written("Fitted model to write.")] = None,
     objective: Annotated[
         Objective,
-        typer.Option(
+        Option(
             help="What is brought near the measurement: the force along the measured "
             "motion, or the motion simulated from the command alone."
         ),
@@ -87,18 +86,16 @@ def fit(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.fit, catalogue=catalogue, test_function=test_function)
-    fitted, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
-    warnings = [*briefly(findings), *silent]
-    result: FitResult | SimulationFit = fitted
+    done = with_logs(job, machine, logs, holdout, test, fits=True)
+    result: FitResult | SimulationFit = done.result
+    alarms: list[str] = []
     if objective is Objective.SIMULATION:
         with progress_on_stderr() as progress:
-            result = moved = workflow.fit_simulation(fitted, progress=progress)
-        warnings += objectives_in_words(moved)
+            result = workflow.fit_simulation(done.result, progress=progress)
+        alarms = objectives_in_words(result)
     if out:
         save_model(result.model, out)
-    return said_of(result, warnings, left_out=silent)
+    return said_of(result, [*done.warnings, *alarms], left_out=done.left_out)
 
 
 @app.command()
@@ -108,7 +105,7 @@ def compare(
     html: Report = None,
     mcap: Annotated[
         Path | None,
-        typer.Option(help="The first log measured, modelled and their difference, as MCAP."),
+        Option(help="The first log measured, modelled and their difference, as MCAP."),
     ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
@@ -121,16 +118,13 @@ def compare(
 
     machine, _ = loaded(model, effects)
     job = partial(workflow.compare, test_function=test_function)
-    result, findings, silent = with_logs(job, machine, logs)
+    done = with_logs(job, machine, logs)
     if html:
         source = _source(model, test_function, effects)
-        with progress_on_stderr() as progress:
-            known = workflow.on_machine(result.model, Recordings(logs), progress=progress)
-        title = f"{machine.name}: model against measurement"
-        _report(html, title, source, None, result, findings, known)
+        _report(html, f"{machine.name}: model against measurement", source, done, logs)
     if mcap:
-        workflow.side_by_side_of(result).write(mcap)
-    return said_of(result, [*briefly(findings), *silent], left_out=silent)
+        workflow.side_by_side_of(done.result).write(mcap)
+    return said_of(done.result, done.warnings, left_out=done.left_out)
 
 
 @app.command()
@@ -153,25 +147,17 @@ def diagnose(
 
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
-    result, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
+    done = with_logs(job, machine, logs, holdout, test, fits=True)
     source = _source(model, test_function, effects)
     if html:
-        title = f"{machine.name}: what the model lacks"
-        with progress_on_stderr() as progress:
-            known = workflow.on_machine(
-                result.final_model, Recordings(logs), result.model if result.effect else None,
-                progress=progress,
-            )  # fmt: skip
-        _report(html, title, source, result, result.comparison, findings, known)
-    answer = answer_of(result, data_faults=findings, left_out=silent)
-    return Said(diagnose_text(result, source), answer, [*briefly(findings), *silent])
+        _report(html, f"{machine.name}: what the model lacks", source, done, logs)
+    answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
+    return Said(diagnose_text(done.result, source), answer, done.warnings)
 
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
     """The command as typed, and what the next one takes over of it."""
-    from identify.output.words.plan import Source
+    from identify.output.words.next_step import Source
 
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
     own = [text for file in effects or () for text in ("--effects", str(file))]
@@ -179,43 +165,40 @@ def _source(model: str, test_function: float | None, effects: list[Path] | None)
 
 
 def _report(
-    out: Path,
-    title: str,
-    source: Source,
-    diagnosis: Diagnosis | None,
-    comparison: Comparison,
-    findings: Sequence[str],
-    known: OnMachine,
-) -> None:
-    """Write a report; findings: on the logs."""
+    out: Path, title: str, source: Source, done: Done[Comparison] | Done[Diagnosis],
+    logs: Sequence[Path],
+) -> None:  # fmt: skip
+    """Write the report of a result, with what its model says of the loop on these logs."""
+    from identify import workflow
     from identify.output.report import write_report
     from identify.output.report.subject import Subject
 
-    history = (diagnosis or comparison).model.history
-    subject = Subject(title, diagnosis, comparison, history, source=source, machine=known)
-    write_report(
-        out,
-        replace(subject, doubts=minor(findings)),
-        assumed=[line for line in findings if ASSUMES in line],
-        faults=[line for line in findings if ": error: " in line],
-    )
+    result = done.result
+    after, before = result.model, None
+    if isinstance(result, workflow.Diagnosis):
+        after, before = result.final_model, result.model if result.effect else None
+    with progress_on_stderr() as progress:
+        known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
+    history, findings = result.model.history, done.findings
+    subject = Subject(title, result, history, (), source, machine=known, findings=findings)
+    write_report(out, subject)
 
 
 @app.command()
 def add(
-    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name from `twin effects`.")],
+    effect: Annotated[str, Argument(metavar="EFFECT", help="Name from `twin effects`.")],
     model: Model,
     logs: FitLogs,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Model with the effect.")],
+    out: Annotated[Path, written("Model with the effect.")],
     holdout: Holdout = None,
     test: Test = None,
     axis: Annotated[
-        str | None, typer.Option(help="Axis; the one that it improves most if left out.")
+        str | None, Option(help="Axis; the one that it improves most if left out.")
     ] = None,
     test_function: TestFunction = None,
     shape: Annotated[
         bool,
-        typer.Option("--shape", help="The model has the effect: give its law the shape found."),
+        Option("--shape", help="The model has the effect: give its law the shape found."),
     ] = False,
     effects: Effects = None,
 ) -> Said:
@@ -232,19 +215,17 @@ def add(
 
     machine, catalogue = loaded(model, effects)
     job: Callable[..., Addition | CorrectedBody]
-    result: Addition | CorrectedBody
     if file := _copy_of(machine, out) if effect == LINK_MASS else None:
         job = partial(workflow.correct_body, file=file.name, test_function=test_function)
     else:
-        made = workflow.add_shape if shape else workflow.add
-        job = partial(made, catalogue[effect], axis=axis, test_function=test_function)
-    result, findings, silent = with_logs(
-        job, machine, logs, holdout, test, refused=meaningless(machine)
-    )
+        call = workflow.add_shape if shape else workflow.add
+        job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
+    done: Done[Addition | CorrectedBody] = with_logs(job, machine, logs, holdout, test, fits=True)
+    made = done.result.model
     if file:
-        write_atomically(file, (result.model.mjcf or "").encode())
-    save_model(result.model, out)
-    return said_of(result, [*briefly(findings), *silent], result.kept, left_out=silent)
+        write_atomically(file, (made.mjcf or "").encode())
+    save_model(made, out)
+    return said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
 
 
 def _copy_of(machine: MachineModel, out: Path) -> Path:
@@ -260,13 +241,13 @@ def _copy_of(machine: MachineModel, out: Path) -> Path:
 
 @app.command()
 def agree(
-    a: Annotated[str, typer.Argument(metavar="A", help="Fitted model (.toml).")],
+    a: Annotated[str, Argument(metavar="A", help="Fitted model (.toml).")],
     b: Annotated[
-        str, typer.Argument(metavar="B", help="Fitted model (.toml), or what `twin export` wrote.")
+        str, Argument(metavar="B", help="Fitted model (.toml), or what `twin export` wrote.")
     ],
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
+        Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
     ] = None,
     effects: Effects = None,
 ) -> Said:
@@ -303,9 +284,7 @@ def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Pa
 def feedforward(
     model: Model,
     logs: Logs,
-    before: Annotated[
-        str | None, typer.Option("--before", help="Model to compare with (.toml).")
-    ] = None,
+    before: Annotated[str | None, Option("--before", help="Model to compare with (.toml).")] = None,
     effects: Effects = None,
 ) -> Said:
     """Tell what the model is worth as feedforward: the tracking error with it, in simulation.
@@ -317,26 +296,18 @@ def feedforward(
 
     machine, catalogue = loaded(model, effects)
     earlier = None if before is None else load_model(before, catalogue)
-    result, findings, silent = with_logs(
-        partial(workflow.feedforward, before=earlier), machine, logs
-    )
-    return said_of(result, [*briefly(findings), *silent])
+    done = with_logs(partial(workflow.feedforward, before=earlier), machine, logs)
+    return said_of(done.result, done.warnings)
 
 
 @app.command()
 def frf(
     logs: Annotated[
         list[str],
-        typer.Argument(
-            metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."
-        ),
+        Argument(metavar="LOG... [MODEL]", help="MCAP logs, and a model (.toml) beside them."),
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The responses to write (.csv, .mcap).")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Bode diagram to write (.png, .svg, .pdf).")
-    ] = None,
+    out: Annotated[Path | None, written("The responses to write (.csv, .mcap).")] = None,
+    plot: Annotated[Path | None, Option(help="Bode diagram to write (.png, .svg, .pdf).")] = None,
     effects: Effects = None,
 ) -> Said:
     """Tell the frequency response of force to position: mass, resonances, delay, margins.
@@ -370,17 +341,15 @@ def frf(
 def plan(
     model: Model,
     logs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[LOG...]", help="Existing MCAP logs.")
+        list[Path] | None, Argument(metavar="[LOG...]", help="Existing MCAP logs.")
     ] = None,
     between: Annotated[
         tuple[str, str] | None,
-        typer.Option(help="Two effects to add to the model, or two fitted models (.toml)."),
+        Option(help="Two effects to add to the model, or two fitted models (.toml)."),
     ] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis to be explained.")] = None,
-    duration: Annotated[float, typer.Option(help="Length of the experiment in s.")] = 20.0,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Experiment to write (.toml).")] = Path(
-        "experiment.toml"
-    ),
+    axis: Annotated[str | None, Option(help="Axis to be explained.")] = None,
+    duration: Annotated[float, Option(help="Length of the experiment in s.")] = 20.0,
+    out: Annotated[Path, written("Experiment to write (.toml).")] = Path("experiment.toml"),
     holdout: Holdout = None,
     test_function: TestFunction = None,
     effects: Effects = None,
@@ -399,11 +368,11 @@ def plan(
         workflow.plan, between=[_rival(name, catalogue) for name in between or ()],
         catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
     )  # fmt: skip
-    result, findings, silent = with_logs(job, machine, logs, holdout)
-    if not result.decides:
-        return said_of(result, [*briefly(findings), *silent], fine=False)
-    chosen, table = result.chosen, out.with_suffix(ENDING)
-    said = said_of(result, [*briefly(findings), *silent], file=out, setpoints=table)
+    done = with_logs(job, machine, logs, holdout)
+    if not done.result.decides:
+        return said_of(done.result, done.warnings, fine=False)
+    chosen, table = done.result.chosen, out.with_suffix(ENDING)
+    said = said_of(done.result, done.warnings, file=out, setpoints=table)
     save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
     write_setpoints(chosen.experiment, machine, 0, table)
     text = (
@@ -425,10 +394,8 @@ def _rival(name: str, catalogue: Catalogue) -> Rival:
 @app.command()
 def demo(
     ctx: typer.Context,
-    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder to write into.")] = Path(
-        "demo"
-    ),
-    seed: Annotated[int, typer.Option(help="Draws the machine and its hidden effect.")] = 2,
+    folder: Annotated[Path, written("Folder to write into.")] = Path("demo"),
+    seed: Annotated[int, Option(help="Draws the machine and its hidden effect.")] = 2,
     model: ModelOption = "proton_xy",
     effects: Effects = None,
 ) -> Said:

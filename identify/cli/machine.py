@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from identify.cli.command import Said, progress_on_stderr
 from identify.cli.shared import (
@@ -17,29 +18,34 @@ from identify.cli.shared import (
     ModelOption,
     Recordings,
     app,
-    briefly,
     left_out,
     loaded,
+    written,
 )
+from identify.output.machine import briefly
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
+
+if TYPE_CHECKING:
+    from identify.view.replay import Replay
+    from twin.parallel import Progress
 
 
 @app.command()
 def simulate(
     experiment: Annotated[
-        str, typer.Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
+        str, Argument(help="tracking, moves, cable_pass, ...; or a .toml from `twin plan`.")
     ],
     model: ModelOption = "proton_xy",
-    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log to write.")] = Path("log.mcap"),
-    seed: Annotated[int, typer.Option(help="Same seed, same log.")] = 0,
+    out: Annotated[Path, written("MCAP log to write.")] = Path("log.mcap"),
+    seed: Annotated[int, Option(help="Same seed, same log.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(help="Length in s, 20 if left out; a file has its own.")
+        float | None, Option(help="Length in s, 20 if left out; a file has its own.")
     ] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis that moves, where one does.")] = None,
+    axis: Annotated[str | None, Option(help="Axis that moves, where one does.")] = None,
     setpoints: Annotated[
         Path | None,
-        typer.Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
+        Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
     ] = None,
     effects: Effects = None,
 ) -> Said:
@@ -79,17 +85,13 @@ def simulate(
 def import_(
     sources: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
+        Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
     ],
     mapping: Annotated[
-        Path | None, typer.Option("--map", help="Columns, units, scale, sign, rate.")
+        Path | None, Option("--map", help="Columns, units, scale, sign, rate.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="MCAP log to write; or the map.")
-    ] = None,
-    guess: Annotated[
-        bool, typer.Option("--guess", help="Propose a map for FILE, with reasons.")
-    ] = False,
+    out: Annotated[Path | None, written("MCAP log to write; or the map.")] = None,
+    guess: Annotated[bool, Option("--guess", help="Propose a map for FILE, with reasons.")] = False,
 ) -> Said:
     """Turn a machine's recording into an MCAP log.
 
@@ -134,10 +136,10 @@ def _guess(sources: list[Path], out: Path | None) -> Said:
 @app.command()
 def new(
     logs: Logs,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Machine model (.toml) to write.")],
+    out: Annotated[Path, written("Machine model (.toml) to write.")],
     mjcf: Annotated[
         Path | None,
-        typer.Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
+        Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
     ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
@@ -174,7 +176,7 @@ def info(
     logs: Logs,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Its signals as a table: .csv, .mat, .parquet."),
+        written("Its signals as a table: .csv, .mat, .parquet."),
     ] = None,
 ) -> Said:
     """Tell what is in logs: length, rate, axes, signals with units and ranges, and faults.
@@ -214,10 +216,10 @@ def check(logs: Logs) -> Said:
 
 @app.command()
 def recover(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="Damaged MCAP log.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="MCAP log of what is intact.")],
+    log: Annotated[Path, Argument(metavar="LOG", help="Damaged MCAP log.")],
+    out: Annotated[Path, written("MCAP log of what is intact.")],
     unproved: Annotated[
-        bool, typer.Option("--unproved", help="Keep samples that no checksum proves as well.")
+        bool, Option("--unproved", help="Keep samples that no checksum proves as well.")
     ] = False,
 ) -> Said:
     """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
@@ -236,13 +238,13 @@ def recover(
 
 @app.command()
 def effects(
-    name: Annotated[str | None, typer.Argument(help="One effect in full.")] = None,
+    name: Annotated[str | None, Argument(help="One effect in full.")] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw what the effect leaves in the force (.png, .svg).")
+        Path | None, Option(help="Draw what the effect leaves in the force (.png, .svg).")
     ] = None,
     files: Effects = None,
     check_: Annotated[
-        bool, typer.Option("--check", help="Run the laws that every effect obeys.")
+        bool, Option("--check", help="Run the laws that every effect obeys.")
     ] = False,
 ) -> Said:
     """Print the catalogue, or one effect with its equation, units and source; or check it.
@@ -284,14 +286,12 @@ def effects(
 @app.command()
 def export(
     model: Model,
-    to: Annotated[str, typer.Option("--to", help=f"{', '.join(format_names())}.")],
+    to: Annotated[str, Option("--to", help=f"{', '.join(format_names())}.")],
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
+        Argument(metavar="[LOG...]", help="MCAP logs on which losses are told in N."),
     ] = None,
-    folder: Annotated[Path, typer.Option("--out", "-o", help="Folder, or the only file.")] = Path(
-        "export"
-    ),
+    folder: Annotated[Path, written("Folder, or the only file.")] = Path("export"),
     effects: Effects = None,
 ) -> Said:
     """Write the model for a controller or another tool, and tell what that cannot hold of it.
@@ -319,12 +319,8 @@ def export(
 
 @app.command()
 def example(
-    name: Annotated[
-        str | None, typer.Argument(help="Which example; all are listed if left out.")
-    ] = None,
-    folder: Annotated[
-        Path | None, typer.Option("--out", "-o", help="New folder; NAME if left out.")
-    ] = None,
+    name: Annotated[str | None, Argument(help="Which example; all are listed if left out.")] = None,
+    folder: Annotated[Path | None, written("New folder; NAME if left out.")] = None,
 ) -> Said:
     """Write an example with its data and the commands to type, or list the examples.
 
@@ -346,29 +342,32 @@ def example(
     return Said("\n".join(lines), answer)
 
 
+Gain = Annotated[
+    float | None,
+    Option(
+        metavar="TIMES",
+        help="How many times larger than they are the differences to the measured motion are "
+        "drawn; chosen so that they are seen if left out.",
+    ),
+]
+
+
 @app.command()
 def view(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP log.")],
+    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
     model: Annotated[
         str | None,
-        typer.Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
+        Argument(metavar="MODEL", help="Machine model (.toml); the log alone if left out."),
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Page to write, which replays it in any browser.")
+        Path | None, Option(help="Page to write, which replays it in any browser.")
     ] = None,
-    video: Annotated[Path | None, typer.Option(help="MP4 to write, without a display.")] = None,
+    video: Annotated[Path | None, Option(help="MP4 to write, without a display.")] = None,
     rerun: Annotated[
-        Path | None, typer.Option(help="Recording (.rrd) to write, for the viewer of Rerun.")
+        Path | None, Option(help="Recording (.rrd) to write, for the viewer of Rerun.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="Speed of the replay; 1 is real time.")] = 1.0,
-    gain: Annotated[
-        float | None,
-        typer.Option(
-            metavar="TIMES",
-            help="How many times larger than they are the differences to the measured motion are "
-            "drawn; chosen so that they are seen if left out.",
-        ),
-    ] = None,
+    speed: Annotated[float, Option(help="Speed of the replay; 1 is real time.")] = 1.0,
+    gain: Gain = None,
     effects: Effects = None,
 ) -> Said:
     """Show the machine as measured, as modelled and as commanded, with forces and what is left.
@@ -377,40 +376,55 @@ def view(
 
     Example: twin view test.mcap fitted.toml --html replay.html
     """
-    from identify.output.answers.machine import ViewAnswer
-
     for option, value in (("--speed", speed), ("--gain", gain)):
         if value is not None and not 0.0 < value < float("inf"):
             raise InputError(f"{option} {value:g}: must be above 0, without unit; 1 is as it was")
     machine = None if model is None else loaded(model, effects)[0]
+    files = {"html": html, "video": video, "rerun": rerun}
     with progress_on_stderr() as progress, left_out() as silent:
         progress("reading and replaying the log", 0, 1)
         from identify.view.replay import replay
 
         shown = replay(machine, Recordings([log])[str(log)], log.name)
         times = shown.gain if gain is None else gain
-        if video:
-            from identify.view.video import write_video
-
-            write_video(video, shown, times, speed, progress)
-    if html:
-        from identify.view.page import write_page
-
-        write_page(html, shown, times, speed)
-    if rerun:
-        from identify.view.rerun import write_recording
-
-        write_recording(rerun, shown, times, speed)
-    if not (html or video or rerun):
+        _write(shown, times, speed, files, progress)
+    if not any(files.values()):
         from identify.view.live import show
 
         show(shown, times, speed)
+    return _said_of_view(shown, log, times, silent, files)
+
+
+def _write(
+    shown: Replay, gain: float, speed: float, files: Mapping[str, Path | None], progress: Progress
+) -> None:
+    """Write the files that are asked for; what each needs is loaded then."""
+    if video := files["video"]:
+        from identify.view.video import write_video
+
+        write_video(video, shown, gain, speed, progress)
+    if html := files["html"]:
+        from identify.view.page import write_page
+
+        write_page(html, shown, gain, speed)
+    if rerun := files["rerun"]:
+        from identify.view.rerun import write_recording
+
+        write_recording(rerun, shown, gain, speed)
+
+
+def _said_of_view(
+    shown: Replay, log: Path, gain: float, silent: list[str], files: Mapping[str, Path | None]
+) -> Said:
+    """What was written of a log, and how large differences are drawn in it."""
+    from identify.output.answers.machine import ViewAnswer
+
     seconds = len(shown) / shown.rate
     answer = ViewAnswer.of(
-        shown, log=log, html=html, video=video, rerun=rerun, axes=list(shown.axes),
-        duration=seconds, gain=times, left_out=silent,
+        shown, log=log, **files, axes=list(shown.axes), duration=seconds, gain=gain,
+        left_out=silent,
     )  # fmt: skip
-    drawn = "at their true size" if times == 1.0 else f"{times:g} times as large"
+    drawn = "at their true size" if gain == 1.0 else f"{gain:g} times as large"
     said = f"{seconds:.3g} s of {log}, differences drawn {drawn}"
-    text = "\n".join(f"{path}: {said}" for path in (html, video, rerun) if path)
+    text = "\n".join(f"{path}: {said}" for path in files.values() if path)
     return Said(text, answer, [*silent, *shown.notes])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 import typer
+from typer import Argument, Option
 
 from identify.cli.command import Commands, Said, progress_on_stderr
+from identify.output.machine import briefly
 from twin.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
-ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
 MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
 
 app = Commands(
@@ -30,36 +31,42 @@ app = Commands(
     pretty_exceptions_enable=False,
 )
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs.")]
-FitLogs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP logs to fit on.")]
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="Machine model (.toml).")]
-ModelOption = Annotated[str, typer.Option("--model", help="Machine model (.toml).")]
+
+def written(what: str) -> Any:
+    """The option -o of a command, with its help."""
+    return Option("--out", "-o", help=what)
+
+
+Logs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs.")]
+FitLogs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs to fit on.")]
+Model = Annotated[str, Argument(metavar="MODEL", help="Machine model (.toml).")]
+ModelOption = Annotated[str, Option("--model", help="Machine model (.toml).")]
 Holdout = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         help="Selection logs (MCAP), one or several: no parameter is fitted on them, but they take "
         "part in the choice of effects.",
     ),
 ]
 Test = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         help="Test logs (MCAP), one or several, on which nothing is decided: they give the error "
         "that is reported.",
     ),
 ]
 TestFunction = Annotated[
     float | None,
-    typer.Option(
+    Option(
         metavar="SECONDS",
         help="Length of the test functions, the time scale of the residual; from the noise if "
         "left out.",
     ),
 ]
-Report = Annotated[Path | None, typer.Option("--out", "-o", help="HTML report.")]
+Report = Annotated[Path | None, written("HTML report.")]
 Effects = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         "--effects", help="Your own effect files, one or several; loading them runs their code."
     ),
 ]
@@ -76,7 +83,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def front_door(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Find out why the model and the machine disagree."""
@@ -89,14 +96,6 @@ def loaded(model: str, effects: list[Path] | None) -> tuple[MachineModel, Catalo
 
     catalogue = load_catalogue(effects or ())
     return load_model(model, catalogue), catalogue
-
-
-def meaningless(model: MachineModel) -> tuple[str, ...]:
-    """Names of the faults of a log with which a fit gives numbers without a meaning.
-
-    Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
-    """
-    return ("UNIT", "SWAPPED") if model.joints else ("SIGN", "UNIT", "SWAPPED")
 
 
 class Recordings(Mapping[str, "Log"]):
@@ -163,19 +162,18 @@ class CheckedRecordings(Recordings):
         return log
 
 
-def minor(findings: Sequence[str]) -> list[str]:
-    """Warnings that leave an answer its meaning: no errors, nor what an import map assumes."""
-    return [line for line in findings if ": warning: " in line and ASSUMES not in line]
+@dataclass(frozen=True)
+class Done(Generic[Result]):
+    """What a job on logs gave. findings: on its first logs; left_out: those that say nothing."""
 
+    result: Result
+    findings: list[str]
+    left_out: list[str]
 
-def briefly(findings: Sequence[str]) -> list[str]:
-    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them."""
-    folded = minor(findings)
-    counts = Counter(line.partition(": warning: ")[0] for line in folded)
-    return [line for line in findings if line not in folded] + [
-        f"{log}: {n} warning{'s' if n > 1 else ''}; `twin check {log}` tells what to do"
-        for log, n in counts.items()
-    ]
+    @property
+    def warnings(self) -> list[str]:
+        """What is said of the logs on standard error."""
+        return [*briefly(self.findings), *self.left_out]
 
 
 def with_logs(
@@ -183,22 +181,23 @@ def with_logs(
     model: MachineModel,
     logs: list[Path] | None,
     *others: list[Path] | None,
-    refused: Collection[str] = (),
-) -> tuple[Result, list[str], list[str]]:
+    fits: bool = False,
+) -> Done[Result]:
     """The result of a job on a model and logs, those of each other role in turn.
 
-    Also the findings on the first logs, and which of any role were left out, and why. refused:
-    names of the faults with which one of the first is refused.
+    fits: to the first logs, which are refused with a fault that gives numbers without a meaning.
     """
     from twin.threads import share_one_arena
 
     share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]
-    recorded = CheckedRecordings(logs or (), every, refused)
+    # Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
+    meaningless = {"UNIT", "SWAPPED"} if model.joints else {"SIGN", "UNIT", "SWAPPED"}
+    recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, left_out() as silent:
         result = job(model, recorded, *rest, progress=progress)
-    return result, recorded.findings, silent
+    return Done(result, recorded.findings, silent)
 
 
 @contextmanager

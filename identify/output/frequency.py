@@ -12,7 +12,7 @@ from identify.frequency.plant import Banded, Plant
 from identify.output import INKS
 from identify.output.numbers import listed, number, percent, pretty, with_band
 from identify.results import figure_of, text_of
-from identify.results.frequency import FrequencyResponse
+from identify.results.frequency import FrequencyResponse, by_source
 from twin.model.units import AxisUnits
 
 if TYPE_CHECKING:
@@ -26,11 +26,10 @@ def frequency_text(result: FrequencyResponse) -> str:
     lines = [f"force to position, from {listed(result.logs)}"]
     for name, axis in result.axes.items():
         lines.append(f"axis {name}")
-        model = "model, in simulation on the same setpoint"
-        for title, shown in (("measured", axis.measured), (model, axis.modelled)):
-            if shown is not None:
-                lines.append(f"  {title}")
-                lines += [f"    {what}: {value}" for what, value in read_off(shown, axis)]
+        for source, shown in by_source(axis).items():
+            how = ", in simulation on the same setpoint" if source == "model" else ""
+            lines.append(f"  {source}{how}")
+            lines += [f"    {what}: {value}" for what, value in read_off(shown, axis)]
         lines.append(f"  {_caution(axis)}")
     return "\n".join(lines)
 
@@ -133,10 +132,7 @@ def bode(result: FrequencyResponse, *_: None) -> Figure:
 def _draw(places: list[Axes], axis: AxisFrequency) -> None:
     level, turn, share = places
     unit = pretty(axis.units("m/N"))
-    pairs = (("measured", axis.measured), ("model", axis.modelled))
-    for (name, shown), ink in zip(pairs, INKS, strict=True):
-        if shown is None:
-            continue
+    for (name, shown), ink in zip(by_source(axis).items(), INKS, strict=False):
         kept = shown.response.tells
         found = shown.response.at(kept)
         size = np.abs(found.plant)

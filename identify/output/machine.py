@@ -6,6 +6,7 @@ whose modules take a second to load.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from twin.export import ExportAgreement, Exported
     from twin.laws.verdict import LawReport
 
+ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
 
 # --- exports ---------------------------------------------------------------------------------
 
@@ -127,6 +129,21 @@ def check_text(reports: Mapping[str, CheckReport]) -> str:
         if not report.findings:
             lines.append(f"{name}: suitable for identification")
     return "\n".join(lines)
+
+
+def minor(findings: Sequence[str]) -> list[str]:
+    """Warnings that leave an answer its meaning: no errors, nor what an import map assumes."""
+    return [line for line in findings if ": warning: " in line and ASSUMES not in line]
+
+
+def briefly(findings: Sequence[str]) -> list[str]:
+    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them."""
+    folded = minor(findings)
+    counts = Counter(line.partition(": warning: ")[0] for line in folded)
+    return [line for line in findings if line not in folded] + [
+        f"{log}: {n} warning{'s' if n > 1 else ''}; `twin check {log}` tells what to do"
+        for log, n in counts.items()
+    ]
 
 
 def info_text(found: Mapping[str, LogInfo]) -> str:

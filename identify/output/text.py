@@ -8,48 +8,44 @@ from typing import TYPE_CHECKING
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
 from identify.output.numbers import Scale, arrow, change, number, quantity
-from identify.output.words.addition import (
-    body_in_words,
-    corrected_in_words,
-    errors_of_step,
-    proved_in_words,
-    step_in_words,
-)
 from identify.output.words.diagnosis import (
     all_found,
-    named_errors_in_words,
     named_in_words,
     said_of,
     tested_on,
     why_not,
 )
 from identify.output.words.fit import (
+    LOOPS,
     agreement_in_words,
     causes_in_words,
     common_reason,
+    correlation_in_words,
     difference_in_words,
     estimate_in_words,
     fit_in_words,
     motion_fit_in_words,
     nonparametric_in_words,
     over_floor,
+    region_in_words,
 )
-from identify.output.words.plan import (
+from identify.output.words.next_step import (
     UNKNOWN,
     Source,
     all_not_run_in_words,
+    body_in_words,
+    errors_of_step,
     experiment_in_words,
     gap_in_words,
     in_order,
     names_of,
     question_in_words,
     supposed_in_words,
+    wrong_body_in_words,
 )
-from identify.output.words.residual import LOOPS, correlation_in_words, region_in_words
 from identify.results import figure_of, html_of, text_of
 from identify.results.results import (
     Addition,
-    AxisSummary,
     Comparison,
     CorrectedBody,
     Diagnosis,
@@ -146,14 +142,15 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
     for axis, d in result.axes.items():
-        said, words = said_of(result, axis), d.base.axis.units.words
+        said, units, tested = said_of(result, axis), d.base.axis.units, d.tested
         named = f" Missing: {named_in_words(d)}." if d.named else ""
-        lines += [
-            f"axis {axis}: {said.verdict}{named}",
-            f"  {words('force error')} {_errors(d, result.summaries[axis])}",
-        ]
-        if d.tested.on is not Role.TRAINING:
-            lines.append(f"  {named_errors_in_words(d)}")
+        fits = [d.base.error] if d.final is d.base else [d.base.error, d.final.error]
+        floor = over_floor(units.force, result.summaries[axis].floor, *fits)
+        errors = [f"{_errors(d, Role.TRAINING, fits[0], fits[-1])}, {floor}"]
+        if tested.on is not Role.TRAINING:
+            errors.append(_errors(d, tested.on, tested.before, tested.after))
+        lines.append(f"axis {axis}: {said.verdict}{named}")
+        lines += [f"  {units.words('force error')} {error}" for error in errors]
         if axis in result.next_experiments:
             lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         for first, *others in said.findings:
@@ -169,14 +166,13 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     return "\n".join(lines)
 
 
-def _errors(found: AxisDiagnosis, summary: AxisSummary) -> str:
-    """Errors on the training logs without and with what was found, and the noise floor."""
-    unit, floor = found.base.axis.units.force, summary.floor
-    base, final = found.base.error, found.final.error
-    if found.final is found.base:
-        return f"on the training logs {quantity(base, unit)}, {over_floor(unit, floor, base)}"
-    errors = f"{arrow(base, final, unit)} with {all_found(found)}"
-    return f"on the training logs {errors}, {over_floor(unit, floor, base, final)}"
+def _errors(found: AxisDiagnosis, on: Role, before: float, after: float) -> str:
+    """Errors on the logs of a role without and with what was found."""
+    unit = found.base.axis.units.force
+    errors = quantity(before, unit)
+    if found.final is not found.base:
+        errors = f"{arrow(before, after, unit)} with {all_found(found)}"
+    return f"on the {on.value} logs {errors}"
 
 
 def _candidates(found: AxisDiagnosis) -> Iterator[str]:
@@ -217,7 +213,9 @@ def plan_text(result: Plan) -> str:
 def add_text(result: Addition) -> str:
     """The errors before and after adding the effect."""
     step, words = result.step, result.units.words
-    lines = [step_in_words(step)]
+    lines = [f"added {step.effect} to axis {step.axis}"]
+    if result.reshaped:
+        lines = [f"gave {step.effect} of axis {step.axis} the shape that the logs show"]
     for role, (before, after) in errors_of_step(step).items():
         what = words(f"force error on the {role.value} logs")
         lines.append(f"  {what:33s} {arrow(before, after, step.unit)}")
@@ -230,15 +228,21 @@ def add_text(result: Addition) -> str:
         )
     lines += [f"  {note}" for note in result.notes]
     if not result.kept:
-        lines.append(f"  {proved_in_words(result)}")
+        lines.append(
+            f"  The logs do not prove it: {result.candidate.refused}. The model has it "
+            "nevertheless, as asked for; go on with the model before, or, if a diagnosis says that "
+            "it needs another beside it, add that to the new model and judge then."
+        )
     return "\n".join(lines)
 
 
 @text_of.register
 def corrected_text(result: CorrectedBody) -> str:
     """What was written into the MuJoCo file, and the errors before and after."""
-    first, *others = corrected_in_words(result)
-    return "\n".join([first, *(f"  {line}" for line in others)])
+    body, file, given = result.body, result.model.mjcf_name, result.given.mjcf_name
+    why = wrong_body_in_words(body, result.given)
+    first = f"Body {body.body} of {file} has {result.element}; {given} is as it was."
+    return "\n".join([first, *(f"  {line}" for line in why)])
 
 
 @text_of.register
@@ -277,15 +281,13 @@ def agree_text(result: Agreement) -> str:
 
 @html_of.register(FitResult | Comparison | Diagnosis)
 def _tables(result: FitResult | Comparison | Diagnosis) -> str:
-    from identify.output import notebook
+    from identify.output.report import tables
 
-    if isinstance(result, FitResult):
-        return notebook.parameters(result)
-    return notebook.tables(result)
+    return tables(result)
 
 
 @figure_of.register(Comparison | Diagnosis)
 def _picture(result: Comparison | Diagnosis, coordinate: str | None, axis: str | None) -> Figure:
-    from identify.output import notebook
+    from identify.output.report.explorer import residual
 
-    return notebook.residual(result, coordinate, axis)
+    return residual(result, coordinate, axis)

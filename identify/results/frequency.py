@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identify.frequency.of_logs import AxisFrequency
+from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.results import Printed, figure_of
 from twin.files import write_atomically
 from twin.signals import Array
@@ -60,11 +60,16 @@ class FrequencyResponse(Printed):
     def tables(self) -> Iterator[tuple[str, str, Mapping[str, Array]]]:
         """Of each axis and source its columns, (n,) by name."""
         for name, axis in self.axes.items():
-            for source, shown in (("measured", axis.measured), ("model", axis.modelled)):
-                if shown is not None:
-                    r, plant = shown.response, shown.response.plant
-                    own = (plant.real, plant.imag, r.band, r.noise, r.distortion, r.coherence)
-                    yield name, source, dict(zip(COLUMNS, (r.frequency, *own), strict=True))
+            for source, shown in by_source(axis).items():
+                r, plant = shown.response, shown.response.plant
+                own = (plant.real, plant.imag, r.band, r.noise, r.distortion, r.coherence)
+                yield name, source, dict(zip(COLUMNS, (r.frequency, *own), strict=True))
+
+
+def by_source(axis: AxisFrequency) -> dict[str, Shown]:
+    """What is measured, and what the model shows in its place where there is one."""
+    model = {} if axis.modelled is None else {"model": axis.modelled}
+    return {"measured": axis.measured, **model}
 
 
 def _csv(found: FrequencyResponse) -> bytes:

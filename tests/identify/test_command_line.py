@@ -1,11 +1,10 @@
-"""The command line as a user meets it: exit codes, JSON by itself, failures of one line."""
+"""The command line as a user meets it: exit codes, JSON by itself, what a call gives, failures."""
 
 from __future__ import annotations
 
 import json
 import shlex
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import get_type_hints
@@ -13,18 +12,26 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 from cli_runs import RATE, in_small, refusal, twin
-from strict_json import valid
+from planted_logs import SLIDE, Ride, having, logged
+from strict_json import strict, valid
 
+from identify import workflow
 from identify.cli import main
 from identify.cli.command import OUTPUTS, Command
-from identify.cli.shared import CheckedRecordings, Recordings, app, briefly
+from identify.cli.shared import CheckedRecordings, Recordings, app
+from identify.output import as_json
+from identify.output import text as as_text
+from identify.output.machine import briefly
+from identify.output.words.next_step import Source
 from twin.checks import check_log
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
+from twin.experiments.file import load_experiment
 from twin.experiments.named import simulate
-from twin.logs import AxisLog, Log, write_log
-from twin.model.file import load_model, models_folder
+from twin.logs import AxisLog, Log, read_log, write_log
+from twin.model.file import load_model, models_folder, save_model
+from twin.model.machine import MachineModel
 
-Cli = Callable[..., tuple[int, str, str]]
 STAGE = (models_folder() / "proton_xy.toml").read_text()
 
 
@@ -50,16 +57,6 @@ def folder(recorded, tmp_path) -> Path:
     narrow = STAGE.replace("travel = [-0.17, 0.17]", "travel = [0.17, -0.17]")
     (tmp_path / "narrow.toml").write_text(narrow)
     return tmp_path
-
-
-@pytest.fixture
-def cli(tmp_path) -> Cli:
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        done = twin(*arguments, folder=tmp_path)
-        return done.returncode, done.stdout, done.stderr
-
-    return run
 
 
 @pytest.mark.parametrize(
@@ -101,20 +98,19 @@ def test_far_names_are_not_suggested(folder):
         (ValueError("odd"), "twin: this is a fault of the program: ValueError: odd; please"),
     ],
 )
-def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, said):
+def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, tmp_path, error, said):
     def fails(*_: object) -> None:
         raise error
 
     monkeypatch.delenv("TWIN_TRACEBACK", raising=False)
     monkeypatch.setattr("twin.effects.load_catalogue", fails)
-    code, out, err = cli("effects", "--json")
+    done = twin("effects", "--json", folder=tmp_path)
     interrupted = isinstance(error, KeyboardInterrupt)
-    assert code == (130 if interrupted else 2)
-    assert err.startswith(said)
-    assert err.count("\n") == 1
-    assert (valid(json.loads(out)) if out else None) == (
-        None if interrupted else {"error": err[6:-1]}
-    )
+    assert done.returncode == (130 if interrupted else 2)
+    assert done.stderr.startswith(said)
+    assert done.stderr.count("\n") == 1
+    told = valid(json.loads(done.stdout)) if done.stdout else None
+    assert told == (None if interrupted else {"error": done.stderr[6:-1]})
     if type(error) is ValueError:
         monkeypatch.setenv("TWIN_TRACEBACK", "1")
         monkeypatch.setattr(sys, "argv", ["twin", "effects"])
@@ -135,10 +131,8 @@ def test_every_failure_is_one_line_and_an_exit_code(monkeypatch, cli, error, sai
         ("diagnose m a -o a.pdf", "a.pdf: a report is an .html file; give such a name"),
     ],
 )
-def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
-    code, out, err = cli(*shlex.split(command))
-    assert (code, out) == (2, "")
-    assert said in err
+def test_what_cannot_be_written_is_said_before_the_work(tmp_path, command, said):
+    assert said in refusal(*shlex.split(command), folder=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -161,17 +155,13 @@ def test_what_cannot_be_written_is_said_before_the_work(cli, command, said):
         ("demo --model better.toml -o .", "read as --model"),
     ],
 )
-def test_no_command_overwrites_what_it_reads(cli, tmp_path, command, said):
+def test_no_command_overwrites_what_it_reads(tmp_path, command, said):
     for name in ("a", "better.toml"):
         (tmp_path / name).write_text("whole")
     (tmp_path / "link").symlink_to("a")
     (tmp_path / "hard").hardlink_to(tmp_path / "a")
-    before = sorted(tmp_path.iterdir())
-    code, out, err = cli(*command.split())
-    assert (code, out) == (2, "")
-    assert said in err
+    assert said in refusal(*command.split(), folder=tmp_path)
     assert (tmp_path / "a").read_text() == (tmp_path / "better.toml").read_text() == "whole"
-    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_every_path_of_a_command_is_known_as_read_or_written():
@@ -183,16 +173,18 @@ def test_every_path_of_a_command_is_known_as_read_or_written():
     assert paths == {*read, *OUTPUTS}
 
 
-def test_help_is_where_it_is_looked_for(cli):
-    assert cli("fit")[2] == "twin: Missing argument 'MODEL'. See `twin fit --help`.\n"
-    assert cli("simulat")[2].endswith("See `twin --help`.\n")
+def test_help_is_where_it_is_looked_for(tmp_path):
+    wrong = refusal("fit", folder=tmp_path), refusal("simulat", folder=tmp_path)
+    assert wrong[0] == "twin: Missing argument 'MODEL'. See `twin fit --help`."
+    assert wrong[1].endswith("See `twin --help`.")
     for command, fits in (("fit", True), ("compare", False), ("check", False), ("new", False)):
-        assert ("MCAP logs to fit on." in cli(command, "--help")[1]) is fits
-    code, out, err = cli()
-    assert (code, err) == (0, "")
-    assert out.count("\n") > 10
-    assert "diagnose" in out
-    assert "selftest" not in out
+        asked = twin(command, "--help", folder=tmp_path).stdout
+        assert ("MCAP logs to fit on." in asked) is fits
+    done = twin(folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("\n") > 10
+    assert "diagnose" in done.stdout
+    assert "selftest" not in done.stdout
 
 
 def test_a_truncated_log_is_recovered_diagnosed_and_no_effect_added(folder):
@@ -261,3 +253,131 @@ def test_identification_holds_no_more_of_a_log_than_it_reads(tmp_path):
     findings = [f"{path}: {f.severity.value}: {f}" for f in check_log(whole).findings]
     assert checked.findings == findings
     assert any("velocity" in f for f in findings)
+
+
+OWN = Path(__file__).parents[2] / "examples" / "my_effect.py"
+HELD, TESTED = ("--holdout", "b.mcap"), ("--test", "c.mcap")
+COMMON = ("--test-function", "0.07")
+TYPED = (*COMMON, "--effects", str(OWN))  # that the next command needs as well
+
+
+FEW = ("coulomb_viscous", "quadratic_drag", "cogging", "wear", OWN.stem)
+
+
+def few(user_files=()) -> Catalogue:
+    """The catalogue in small, so that a diagnosis takes seconds."""
+    return Catalogue([e for n, e in load_catalogue(user_files).items() if n in FEW])
+
+
+@pytest.fixture(scope="module")
+def slide(tmp_path_factory) -> Path:
+    """A model of one axis, and logs of it with a drag that it lacks."""
+    path = tmp_path_factory.mktemp("machine")
+    save_model(MachineModel("slide", {"x": SLIDE}, 1000.0), path / "m.toml")
+    dragged = having(SLIDE, "quadratic_drag", c=3.0)
+    for seed, name in enumerate("abc", start=1):
+        write_log(logged(dragged, Ride(seed, 4.0)), path / f"{name}.mcap")
+    return path
+
+
+def logs_of(slide: Path, *names: str) -> dict:
+    return {f"{n}.mcap": read_log(slide / f"{n}.mcap") for n in names}
+
+
+def called(name: str, slide: Path) -> object:
+    """The call from Python that a command with HELD, TESTED and COMMON stands for."""
+    catalogue = few([OWN] if name == "diagnose" else ())
+    model = load_model(slide / "m.toml", catalogue)
+    fit, held, test = (logs_of(slide, n) for n in "abc")
+    if name == "compare":
+        return workflow.compare(model, fit, test_function=0.07)
+    if name == "plan":
+        between = [catalogue["quadratic_drag"], catalogue["cogging"]]
+        return workflow.plan(
+            model, fit, held, between=between, catalogue=catalogue, axis="x", duration=3.0,
+            test_function=0.07,
+        )  # fmt: skip
+    if name == "add":
+        effect = catalogue["quadratic_drag"]
+        return workflow.add(effect, model, fit, held, test, axis="x", test_function=0.07)
+    call = {"fit": workflow.fit, "diagnose": workflow.diagnose}[name]
+    return call(model, fit, held, test, catalogue=catalogue, test_function=0.07)
+
+
+ARGUMENTS = {
+    "fit": ("m.toml", "a.mcap", *HELD, *TESTED),
+    "compare": ("m.toml", "a.mcap"),
+    "diagnose": ("m.toml", "a.mcap", *HELD, *TESTED, "--effects", OWN),
+    "add": ("quadratic_drag", "m.toml", "a.mcap", *HELD, *TESTED, "--axis", "x"),
+    "plan": ("m.toml", "a.mcap", *HELD, "--between", "quadratic_drag", "cogging", "--axis", "x",
+             "--duration", "3"),
+}  # fmt: skip
+OUT = {"fit": "f.toml", "add": "n.toml", "plan": "e.toml"}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch):
+    monkeypatch.setattr("twin.effects.load_catalogue", few)
+    out = OUT.get(name, f"{name}.html")
+    done = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, "--json", folder=slide)
+    found = called(name, slide)
+    wanted, told = strict(as_json.json_of(found)), json.loads(done.stdout)
+    added = {"left_out", "data_faults", "file", "setpoints"}
+    assert {k: v for k, v in told.items() if k not in added} == {
+        k: v for k, v in wanted.items() if k not in added
+    }
+    valid(told)
+    assert done.returncode == 0, done.stderr
+    assert (slide / out).is_file()
+    text = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, folder=slide).stdout
+    source = () if name != "diagnose" else (Source(model="m.toml", options=shlex.join(TYPED)),)
+    assert text.startswith(getattr(as_text, f"{name}_text")(found, *source))
+    if name in ("fit", "add"):
+        again = load_model(slide / out, load_catalogue())
+        assert again.axes["x"].names == found.model.axes["x"].names
+        assert again.axes["x"].mass == pytest.approx(found.model.axes["x"].mass)
+    if name == "plan":
+        assert (found.favoured, found.supposed) == ("quadratic_drag", False)
+        assert found.gap.share is not None
+        assert load_experiment(slide / out) == found.chosen.experiment
+        assert f"twin simulate {out}" in text
+        assert (slide / told["setpoints"]).name == "e.setpoints.csv"
+        assert (slide / told["setpoints"]).is_file()
+    if out.endswith(".html"):
+        assert (slide / out).read_text(encoding="utf-8").count("<section") > 3
+
+
+def test_a_simulation_is_that_of_its_seed_duration_and_axis(slide):
+    asked = ("--model", "m.toml", "--seed", "5", "--duration", "1.5", "--axis", "x")
+    done = twin("simulate", "cable_pass", *asked, "-o", "r.mcap", "--json", folder=slide)
+    log = read_log(slide / "r.mcap")
+    assert valid(json.loads(done.stdout)) == {
+        "log": "r.mcap", "samples": len(log), "sample_rate": 1000.0, "unit": "Hz",
+        "setpoints": None,
+    }  # fmt: skip
+    model = load_model(slide / "m.toml", load_catalogue())
+    wanted = simulate(model, "cable_pass", seed=5, duration=1.5, axis="x")
+    np.testing.assert_array_equal(log.axes["x"].position, wanted.axes["x"].position)
+
+
+def test_the_catalogue_is_printed_and_one_effect_drawn(tmp_path):
+    every = json.loads(twin("effects", "--json", folder=tmp_path).stdout)["effects"]
+    assert [e["name"] for e in every] == list(load_catalogue())
+    one = valid(json.loads(twin("effects", "wear", "--json", folder=tmp_path).stdout))
+    assert one in every
+    done = twin("effects", "--plot", "w.svg", folder=tmp_path)
+    said = "twin: --plot w.svg: draws one effect; give its NAME\n"
+    assert (done.returncode, done.stderr) == (2, said)
+    assert "wear" in twin("effects", "wear", "--plot", "w.svg", folder=tmp_path).stdout
+    assert "<svg" in (tmp_path / "w.svg").read_text(encoding="utf-8")
+
+
+def test_a_check_ends_with_one_where_a_log_is_unfit(slide):
+    log = read_log(slide / "a.mcap")
+    log.axes["x"].columns["force"][:] *= -1.0  # of the other sign
+    write_log(log, slide / "h.mcap")
+    for first, code in (("h.mcap", 1), ("a.mcap", 0)):
+        done = twin("check", first, "b.mcap", "--json", folder=slide)
+        told = json.loads(done.stdout)
+        assert (done.returncode, told["ok"]) == (code, code == 0)
+        assert list(told["logs"]) == [first, "b.mcap"]

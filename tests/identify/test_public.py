@@ -1,21 +1,26 @@
-"""What Python users are offered, and fits without a meaning, which are refused."""
+"""What Python users are offered, fits without a meaning, which are refused; files for viewers."""
 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import cli_runs
+import numpy as np
 import pytest
+from cli_runs import in_small
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 import identify
 import twin
 from identify.output.words.fit import objectives_in_words
 from identify.results.results import SimulationFit
 from twin.errors import InputError
-from twin.logs import Log, logs_by_name, write_log
+from twin.logs import Log, logs_by_name, write_log, write_topics
 from twin.model.machine import AxisModel
 
 
@@ -83,6 +88,8 @@ def test_what_is_no_model_is_one_line(log) -> None:
 
 def test_logs_and_models_print_themselves_in_a_line(log) -> None:
     assert repr(log).startswith("<Log of 2 s at 10000 Hz, x: setpoint_position, ")
+    least = f"{log.axes['x'].position.min():.4g}"
+    assert f"xpositionm{least}" in re.sub(r"<.*?>|\s", "", log._repr_html_())
     assert repr(log.axes["x"]).startswith("<AxisLog of 20000 samples: setpoint_position (m), ")
     model = twin.load_model("proton_xy")
     assert repr(model).startswith("<MachineModel Proton Motion Stage at 10000 Hz, ")
@@ -155,3 +162,50 @@ def test_a_force_that_may_have_either_sign_is_none():
     )
     other = replace(effect, values={**effect.values, parameter: 77.0})
     assert disagreements(begun.with_effect(other)) == []
+
+
+LAYOUT = Path(__file__).parents[2] / "examples" / "foxglove.json"
+Columns = dict[str, np.ndarray]
+
+
+def stock_read(path: Path) -> dict[str, Columns]:
+    """Topic -> column -> values, by the stock reader."""
+    found: dict[str, dict[str, list[float]]] = {}
+    with open(path, "rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        for _, channel, _, message in reader.iter_decoded_messages():
+            columns = found.setdefault(channel.topic, {})
+            for field in message.DESCRIPTOR.fields:
+                columns.setdefault(field.name, []).append(getattr(message, field.name))
+    return {t: {n: np.array(v) for n, v in c.items()} for t, c in found.items()}
+
+
+def test_every_message_is_what_was_written(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    topics = {f"/{k}/x": {n: rng.standard_normal(500) for n in "ab"} for k in ("model", "left")}
+    topics["/model/x"]["a"][3] = 0.0
+    write_topics(topics, {"/model/x/a": "m"}, 1000.0, tmp_path / "a.mcap")
+    found = stock_read(tmp_path / "a.mcap")
+    assert found.keys() == topics.keys()
+    for topic, columns in topics.items():
+        for name, column in columns.items():
+            np.testing.assert_array_equal(found[topic][name], column)
+    with pytest.raises(InputError, match="is nan at"):
+        write_topics({"/a": {"b": np.array([np.nan])}}, {}, 1.0, tmp_path / "b.mcap")
+
+
+def test_measured_is_model_and_residual_and_the_layout_shows_them(tmp_path: Path) -> None:
+    with in_small(duration=2.0):
+        cli_runs.twin("simulate", "tracking", "-o", "l.mcap", folder=tmp_path)
+        done = cli_runs.twin("compare", "proton_xy", "l.mcap", "--mcap", "s.mcap", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = stock_read(tmp_path / "s.mcap")
+    for axis in "xy":
+        parts = [found[f"/{kind}/{axis}"]["position"] for kind in ("measured", "model", "residual")]
+        np.testing.assert_allclose(parts[0], parts[1] + parts[2], atol=1e-15)
+        assert np.std(found[f"/residual/{axis}"]["force"]) > 0.0
+    shown = json.loads(LAYOUT.read_text(encoding="utf-8"))["configById"]
+    for panel in shown.values():
+        for path in panel["paths"]:
+            topic, _, column = path["value"].partition(".")
+            assert column in found[topic]

@@ -11,7 +11,6 @@ import pytest
 from built_fits import built, built_fit
 from constructed import CATALOGUE, effect
 from machines import one_axis
-from report_cases import Case, cogging_case
 
 from identify import workflow
 from identify.dataset.dataset import Role
@@ -158,11 +157,6 @@ def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
     b = axis_with(verdict, bic=80.0, ratio=3.0)
     assert leading(a=a, b=b) == ("a" if named else "b")
     assert leading(a=a, b=replace(b, ranking=())) == ("a" if named else "b")
-
-
-@pytest.fixture(scope="module")
-def case() -> Case:
-    return cogging_case()
 
 
 def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_final_model(case):

@@ -7,10 +7,10 @@ units. ``python -m identify.output.as_json`` writes the schema anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 from functools import singledispatch
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -63,7 +63,7 @@ class Entry(BaseModel):
     @classmethod
     def of(cls, *sources: object, **given: Any) -> Self:
         """With the entries that are given, and the others from the first source that has them."""
-        return cls.model_validate(_Joined(sources, given))
+        return cls.model_validate(_Joined(SimpleNamespace(**given), *sources))
 
 
 class Answer(Entry):
@@ -80,19 +80,15 @@ class Answer(Entry):
 
 
 class _Joined:
-    """The attributes of several objects as those of one."""
+    """The attributes of several objects as those of one: of the first that has them."""
 
-    def __init__(self, sources: Sequence[object], given: dict[str, Any]) -> None:
-        self._sources, self._given = sources, given
+    def __init__(self, *sources: object) -> None:
+        self._sources = sources
 
     def __getattr__(self, name: str) -> Any:
-        if name in self._given:
-            return self._given[name]
         for source in self._sources:
-            try:
+            if hasattr(source, name):
                 return getattr(source, name)
-            except AttributeError:
-                continue
         raise AttributeError(name)
 
 

@@ -25,7 +25,7 @@ from identify.output.words.diagnosis import (
     said_of,
     why_not,
 )
-from identify.output.words.plan import gap_in_words, in_order, not_run_in_words
+from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
 from identify.results.results import Addition, CorrectedBody, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
@@ -158,7 +158,7 @@ class CandidateEntry(ValuesEntry):
     delta_bic: Number
     holdout_error_before: Number = read("gain.before")
     holdout_error_after: Number = read("gain.after")
-    unit: str
+    unit: str = read("fit.axis.units.force")
     supported: bool
     part: Number
     why_not: Told
@@ -177,7 +177,6 @@ def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
     return {
         "effect": c.effect.name,
         "delta_bic": c.delta_bic if c.score else None,
-        "unit": c.fit.axis.units.force,
         "why_not": why_not(d, c),
         **_values(c),
     }
@@ -314,7 +313,7 @@ def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None
 class DiagnosisEntry(Entry):
     """The diagnosis of an axis."""
 
-    axis: str
+    axis: str = read("dataset.axis")
     verdict: Annotated[str, LOWER] = read("verdict.name")
     explanation: str
     effect: str | None
@@ -338,7 +337,7 @@ class DiagnosisEntry(Entry):
     test_error_before: Number = read("tested.before")
     test_error_after: Number = read("tested.after")
     test_error_on: Role = read("tested.on")
-    unit: str
+    unit: str = read("base.axis.units.force")
     parameters: dict[str, EstimateEntry]
     force_shift: Number = read("dataset.channel_delay")
     force_shift_unit: str = "s"
@@ -439,14 +438,12 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
     return DiagnosisEntry.of(
         d,
         summary,
-        axis=axis,
         explanation=said.verdict,
         effect=d.best.effect.name if d.best else None,
         needed_together=pairs_in_words(d),
         remainder=_remainder(d, result.left_over.get(axis)),
         ranking=[CandidateEntry.of(c, **_candidate(c, d)) for c in d.ranking],
         steps=[_step(d, i) for i in range(len(d.steps))],
-        unit=d.base.axis.units.force,
         parameters=estimate_entries(summary.after),
         refit=result.refits.get(axis),
         not_tried=result.not_tried,

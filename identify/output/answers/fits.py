@@ -10,12 +10,13 @@ from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.answers import LOWER, Answer, Entry, Number, answer_of, read
 from identify.output.words.fit import (
+    LOOPS,
     MOTION_OUTCOMES,
     OUTCOMES,
     no_interval_in_words,
     objectives_in_words,
+    region_in_words,
 )
-from identify.output.words.residual import LOOPS, region_in_words
 from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
 from identify.validation.agreement import Agreement
 from identify.validation.comparison import AxisComparison

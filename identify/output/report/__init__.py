@@ -8,12 +8,24 @@ from datetime import date
 from pathlib import Path
 
 from identify.dataset.dataset import Role
-from identify.output.numbers import quantity
+from identify.output.machine import ASSUMES
+from identify.output.numbers import capitalised, quantity
 from identify.output.report import answer, effects, machine, residual
 from identify.output.report.explorer import explored
-from identify.output.report.page import Answer, Block, Heading, Part, Section
+from identify.output.report.page import (
+    Answer,
+    Block,
+    Chart,
+    Heading,
+    Listing,
+    Part,
+    Section,
+    fragment,
+)
 from identify.output.report.page import page as whole_page
 from identify.output.report.subject import Subject
+from identify.output.words.fit import fit_in_words
+from identify.results.results import Comparison, Diagnosis, FitResult
 from twin.files import require_writable, write_atomically
 from twin.model.file import format_model
 
@@ -34,19 +46,15 @@ SECTIONS = (
 )
 
 
-def write_report(
-    path: Path, subject: Subject, assumed: Sequence[str] = (), faults: Sequence[str] = ()
-) -> None:
+def write_report(path: Path, subject: Subject) -> None:
     """Write the report of a comparison, and of a diagnosis or additions where there are any.
-
-    assumed, faults: findings of the log check on what import maps assume, and its errors, said
-    first.
 
     One HTML file without outside references: styles, scripts and signals are inside. It appears
     whole or not at all. Raises InputError where the folder does not exist.
     """
     require_writable(path)
-    warnings = [("Assumed", line) for line in assumed] + [("Fault", line) for line in faults]
+    first = (("Assumed", ASSUMES), ("Fault", ": error: "))
+    warnings = [(what, line) for what, mark in first for line in subject.findings if mark in line]
     shown, signals = sections(subject), explored(subject)
     text = whole_page(subject.title, facts(subject), shown, signals, origin(subject), warnings)
     write_atomically(path, text.encode("utf-8"))
@@ -67,6 +75,28 @@ def sections(subject: Subject, parts: Sequence[Part] = SECTIONS) -> list[Section
         if blocks:
             made.append(Section(part.anchor, part.title, blocks))
     return made
+
+
+def tables(result: FitResult | Comparison | Diagnosis) -> str:
+    """What a notebook shows: the answer and the tables of a report, without its plots."""
+    if isinstance(result, FitResult):
+        return fragment(_fitted(result))
+    shown = ("answer", "found", "regions", "parameters", "logs")
+    blocks: list[Block] = []
+    for section in sections(Subject("", result), [p for p in SECTIONS if p.anchor in shown]):
+        blocks += [Heading(section.title)] if section.anchor != "answer" else []
+        blocks += [block for block in section.blocks if not isinstance(block, Chart)]
+    return fragment(blocks)
+
+
+def _fitted(result: FitResult) -> list[Block]:
+    """What is said of each axis, with its parameters in a table."""
+    blocks: list[Block] = []
+    for axis, fit in result.fits.items():
+        said = [capitalised(line) for line in fit_in_words(result, axis)]
+        table = effects.fit_table(fit.axis, {"Value": result.estimates[axis]}, fit.floor)
+        blocks += [Listing(said), *table]
+    return blocks
 
 
 def facts(subject: Subject) -> list[tuple[str, str]]:

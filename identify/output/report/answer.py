@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from identify.dataset.dataset import Role
 from identify.links import WrongBody
+from identify.output.machine import minor
 from identify.output.numbers import Scale, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import Answer, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.addition import body_in_words
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
-from identify.output.words.plan import Source, next_step_in_words
+from identify.output.words.next_step import Source, body_in_words, next_step_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -132,5 +132,6 @@ def notes(subject: Subject) -> list[Block]:
     for step in subject.history:
         how = "given the shape found" if step.action == "shape" else "added"
         said += [f"Axis {step.axis}, {spaced(step.effect)} {how}: {note}" for note in step.notes]
-    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in (*said, *subject.doubts)))
+    said += minor(subject.findings)
+    once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in said))
     return [Listing(once)] if once else []

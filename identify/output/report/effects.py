@@ -32,7 +32,6 @@ from identify.output.report.page import (
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.addition import errors_of_step
 from identify.output.words.diagnosis import shape_in_words, tested_on, why_not
 from identify.output.words.fit import (
     common_reason,
@@ -40,6 +39,7 @@ from identify.output.words.fit import (
     no_interval_in_words,
     nonparametric_in_words,
 )
+from identify.output.words.next_step import errors_of_step
 from identify.results.results import Addition
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis

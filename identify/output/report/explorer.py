@@ -1,21 +1,27 @@
-"""The signals of each axis as report.js reads them: packed into the page, no extreme lost."""
+"""The signals of each axis: packed into a page, as report.js reads them, or drawn in a notebook."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Role
+from identify.output import INKS
 from identify.output.numbers import Scale, packed, quantity, spaced, title_case, typeset
 from identify.output.report.subject import AxisView, Subject
-from identify.results.signals import Signals
+from identify.results.results import Comparison, Diagnosis
+from identify.results.signals import Signals, means
 from twin.curve import Coordinate
 from twin.effect import Effect, Kind
+from twin.errors import InputError
 from twin.model.units import units_of
 from twin.signals import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Named = dict[str, tuple[str, Array, Scale]]
 
@@ -171,3 +177,34 @@ def _coded(values: Array) -> dict[str, Any]:
     step = float(np.arcsinh(largest / scale)) / 32767
     coded = np.where(finite, np.rint(np.arcsinh(beside / scale) / step), -32768)
     return {"middle": middle, "scale": scale, "step": step, "data": packed(coded)}
+
+
+# --- in a notebook ---------------------------------------------------------------------------
+
+
+def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str | None) -> Figure:
+    """The residual without and with what was found, as dots and as means over a coordinate."""
+    import matplotlib.pyplot as plt
+
+    views = {view.name: view for view in Subject("", result).views}
+    if axis is not None and axis not in views:
+        raise InputError(f"no axis '{axis}' in the result; it has {', '.join(views)}")
+    view = views[axis] if axis else next(iter(views.values()))
+    signals = view.signals
+    name = coordinate or coordinate_of_answer(view, list(signals.coordinates))
+    values = signals.over(name)
+    shown = named_signals(view)
+    _, _, left = shown["before"]
+    label, _, along = shown.get(name, ("Time", values, Scale.of("s", values)))
+    figure, place = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
+    plt.close(figure)  # a notebook shows what is returned, once
+    floor = float(left(view.axis.floor))
+    place.axhspan(-floor, floor, color="#dfe4e9", label="noise floor")
+    for which, ink in zip(("before", "after"), INKS, strict=True):
+        if which in shown:
+            title, error, _ = shown[which]
+            place.plot(along(values), left(error), ".", markersize=2, alpha=0.25, color=ink)
+            place.plot(*means(along(values), left(error)), color=ink, label=f"mean {title}")
+    place.set(xlabel=along.label(label), ylabel=left.label(view.words("Unexplained force")))
+    place.legend()
+    return figure

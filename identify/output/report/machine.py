@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from identify.frequency.of_logs import AxisFrequency, Shown
-from identify.frequency.response import Response
+from identify.frequency.of_logs import AxisFrequency
 from identify.output.frequency import read_off
 from identify.output.numbers import NOTHING, pretty, quantity
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView
-from twin.signals import Array
+from identify.results.frequency import by_source
 
 
 def responses(view: AxisView) -> list[Block]:
@@ -21,57 +18,40 @@ def responses(view: AxisView) -> list[Block]:
     found = response.axes.get(view.name) if response else None
     if found is None or found.measured.plant is None:
         return []
-    return [_magnitude(found), _phase(found), _table(found)]
+    return [*_bode(found), _table(found)]
 
 
-def _shown(found: AxisFrequency) -> list[tuple[str, Shown, Ink]]:
-    """What is drawn: the model's response is of the same frequencies as the measured one."""
-    model = [("model", found.modelled, Ink.AFTER)] if found.modelled else []
-    return [("measured", found.measured, Ink.INK), *model]
+def _bode(found: AxisFrequency) -> list[Chart]:
+    """Magnitude and phase of each response, at the frequencies at which one tells something.
 
-
-def _magnitude(found: AxisFrequency) -> Chart:
-    def lines(name: str, response: Response) -> list[tuple[str, Array, Line]]:
-        size, band = np.abs(response.plant), f"{name}, 90 % band"
-        low, high = np.maximum(size - response.band, 1e-3 * size), size + response.band
+    The model's is of the same frequencies as the measured one.
+    """
+    shown = by_source(found)
+    told = np.any([one.response.tells for one in shown.values()], axis=0)
+    sizes, phases = [], []
+    for (name, one), ink in zip(shown.items(), (Ink.INK, Ink.AFTER), strict=False):
+        response, band = one.response, f"{name}, 90 % band"
+        plant = np.where(response.tells, response.plant, np.nan)[told]
+        size, half = np.abs(plant), response.band[told]
+        low, high = np.maximum(size - half, 1e-3 * size), size + half
         curves = ((band, low, Line.BAND), (band, high, Line.BAND), (name, size, Line.LINE))
-        return [(label, 20.0 * np.log10(curve), line) for label, curve, line in curves]
-
+        sizes += [Drawn(label, 20.0 * np.log10(curve), line, ink) for label, curve, line in curves]
+        phases.append(Drawn(name, np.degrees(np.angle(plant)) % -360.0, ink=ink))
     caption = (
         "Force to position, as the best linear approximation with the setpoint as instrument. The "
         "model is simulated on the same setpoint, so that friction lowers both alike."
     )
-    return _chart(found, f"Magnitude (dB of {pretty(found.units('m/N'))})", lines, caption)
-
-
-def _phase(found: AxisFrequency) -> Chart:
-    def lines(name: str, response: Response) -> list[tuple[str, Array, Line]]:
-        return [(name, np.degrees(np.angle(response.plant)) % -360.0, Line.LINE)]
-
-    return _chart(found, "Phase (degrees)", lines)
-
-
-def _chart(
-    found: AxisFrequency,
-    title: str,
-    lines: Callable[[str, Response], list[tuple[str, Array, Line]]],
-    caption: str = "",
-) -> Chart:
-    """Lines of each response, at the frequencies at which one of them tells something."""
-    shown = _shown(found)
-    told = np.any([one.response.tells for _, one, _ in shown], axis=0)
-    drawn = [
-        Drawn(label, np.where(one.response.tells, values, np.nan)[told], line, ink)
-        for name, one, ink in shown
-        for label, values, line in lines(name, one.response)
+    along = ("Frequency (Hz)", found.measured.response.frequency[told])
+    level = f"Magnitude (dB of {pretty(found.units('m/N'))})"
+    return [
+        Chart(along, level, sizes, caption, log_x=True),
+        Chart(along, "Phase (degrees)", phases, log_x=True),
     ]
-    frequencies = ("Frequency (Hz)", found.measured.response.frequency[told])
-    return Chart(frequencies, title, drawn, caption, log_x=True)
 
 
 def _table(found: AxisFrequency) -> Table:
     """What is read off each, side by side."""
-    told = {name: dict(read_off(shown, found)) for name, shown, _ in _shown(found)}
+    told = {name: dict(read_off(shown, found)) for name, shown in by_source(found).items()}
     rows = dict.fromkeys(name for facts in told.values() for name in facts)
     titles = ("Read off, with 90 % band", *(name.capitalize() for name in told))
     cells = [(row, *(facts.get(row, NOTHING) for facts in told.values())) for row in rows]

@@ -10,7 +10,7 @@ from identify.estimation.residual_dependence import Dependence
 from identify.output.numbers import Scale, capitalised, inverse, number, percent, quantity, spaced
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.residual import (
+from identify.output.words.fit import (
     LEAST_SHARE,
     LOOPS,
     correlation_in_words,

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, all_found, said_of
-from identify.output.words.plan import UNKNOWN, Source, names_of
+from identify.output.words.next_step import UNKNOWN, Source, names_of
 from identify.results.results import UNTOLD, Addition, AxisSummary, Comparison, Diagnosis, OnMachine
 from identify.results.signals import Signals, signals_of
 from identify.rules import RULE
@@ -20,20 +20,27 @@ from twin.model.units import AxisUnits
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """The results that a report shows. history: the effects that were added to the model.
+    """What a report shows: a result, and the effects that were added to its model (history).
 
-    source: what the page is made of. machine: what the model says of its loop. doubts: warnings of
-    the check that the logs passed.
+    source: what the page is made of. machine: what the model says of its loop. findings: of the
+    check of the logs.
     """
 
     title: str
-    diagnosis: Diagnosis | None
-    comparison: Comparison
+    result: Diagnosis | Comparison
     history: Sequence[HistoryStep] = ()
     additions: Sequence[Addition] = ()
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
-    doubts: Sequence[str] = ()
+    findings: Sequence[str] = ()
+
+    @property
+    def diagnosis(self) -> Diagnosis | None:
+        return self.result if isinstance(self.result, Diagnosis) else None
+
+    @property
+    def comparison(self) -> Comparison:
+        return self.result.comparison if isinstance(self.result, Diagnosis) else self.result
 
     @cached_property
     def logs(self) -> dict[Role, list[str]]:

@@ -13,7 +13,6 @@ from identify.estimation.fit import Outcome
 from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.output.numbers import (
     Scale,
-    arrow,
     capitalised,
     change,
     each_with_unit,
@@ -23,16 +22,17 @@ from identify.output.numbers import (
     quantity,
     spaced,
 )
-from identify.output.words.addition import also_chose_in_words
 from identify.output.words.fit import (
     OUTCOMES,
     aliasing_in_words,
+    dependence_in_words,
     moved_in_words,
     prepared_in_words,
     refit_in_words,
+    repeat_in_words,
+    worst_in_words,
 )
-from identify.output.words.plan import fitted_curves, next_commands
-from identify.output.words.residual import dependence_in_words, repeat_in_words, worst_in_words
+from identify.output.words.next_step import also_chose_in_words, fitted_curves, next_commands
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.candidates import Candidate
@@ -355,15 +355,6 @@ def tested_on(found: AxisDiagnosis) -> str:
     """What the error is called by which a candidate was judged."""
     kind = "selection error" if found.dataset.holdout else "cross-validated error"
     return f"{kind} of the beginnings, which were searched" if found.in_part else kind
-
-
-def named_errors_in_words(found: AxisDiagnosis) -> str:
-    """The force error on the test logs, or on those that also chose, without and with the named."""
-    tested, unit = found.tested, found.base.axis.units.force
-    what = f"{units_of(unit).words('force error')} on the {tested.on.value} logs"
-    if found.final is found.base:
-        return f"{what} {quantity(tested.before, unit)}"
-    return f"{what} {arrow(tested.before, tested.after, unit)} with {all_found(found)}"
 
 
 # --- the way to the answer --------------------------------------------------------------------

@@ -22,8 +22,7 @@ from identify.estimation.residual_dependence import (
 )
 from identify.estimation.residual_noise import is_noise as noise_is_left
 from identify.estimation.residual_noise import noise_known, with_own_noise
-from identify.output.words.fit import prepared_in_words
-from identify.output.words.residual import repeat_in_words
+from identify.output.words.fit import prepared_in_words, repeat_in_words
 from twin.model.machine import AxisModel
 
 RNG = np.random.default_rng(51)

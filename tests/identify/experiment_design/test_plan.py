@@ -140,7 +140,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     assert "rate of change of the motor force" in following["missing_motion"]
     assert following["expected_difference"] > 0.1 * following["noise_floor"]
     assert "passes" in diagnose_text(found)
-    subject = Subject("test", found, found.comparison, (), ())
+    subject = Subject("test", found)
     card = next(s for s in sections(subject) if s.anchor == "answer").blocks[0]
     assert any("twin plan" in remark for remark in card.remarks)
 

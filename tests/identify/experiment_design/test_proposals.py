@@ -19,7 +19,7 @@ from identify.experiment_design.discrimination import (
 )
 from identify.output.as_json import json_of
 from identify.output.text import plan_text
-from identify.output.words.plan import not_run_in_words
+from identify.output.words.next_step import not_run_in_words
 from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment

@@ -1,4 +1,4 @@
-"""The report: one file that needs nothing else, says the verdict, and holds what is measured."""
+"""The report, one file that needs nothing else; its words and numbers."""
 
 from __future__ import annotations
 
@@ -11,24 +11,40 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import built_results as made
 import numpy as np
 import pytest
+from built_fits import axis_of, built, built_fit, fitted
 from report_cases import Case, Outline
 
-from identify.dataset.dataset import Role
-from identify.output.numbers import arrow, quantity, typeset
-from identify.output.report.explorer import coordinate_of_answer, shown_of
+from identify import workflow
+from identify.dataset.noise_floor import NoiseFloor
+from identify.estimation.confounded import MovedParameter
+from identify.estimation.fit import Outcome, finished
+from identify.experiment_design.missing_excitation import Gap
+from identify.output.numbers import Scale, capitalised, quantity, span, typeset
+from identify.output.report.explorer import coordinate_of_answer, explored, shown_of
 from identify.output.report.page import Chart
 from identify.output.report.residual import regions
-from identify.output.words.diagnosis import verdict_in_words
-from identify.output.words.plan import Source
+from identify.output.words.fit import aliasing_in_words, moved_in_words, place_in_words
+from identify.output.words.next_step import (
+    Source,
+    axis_in_words,
+    errors_of_step,
+    gap_in_words,
+    notes_in_words,
+)
+from identify.results.results import Addition
 from identify.results.signals import Signals
 from identify.workflow import on_machine
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
+from twin.experiments.file import in_short
+from twin.experiments.kinds import Rests
 from twin.logs import write_log
-from twin.model.file import save_model
-from twin.model.machine import Fitted
+from twin.model.file import load_model, save_model
+from twin.model.machine import Fitted, HistoryStep, MachineModel
+from twin.model.units import LINEAR
 
 MOST_BYTES = 3_000_000
 
@@ -66,34 +82,12 @@ def test_every_section_is_there(page: str) -> None:
     assert re.findall(r'<a href="#(\w+)">', page) == expected
 
 
-def test_what_is_named_is_shown_with_what_it_gains_as_feedforward(case: Case, tmp_path) -> None:
+def test_what_feedforward_gains_is_known_where_something_was_found(case: Case) -> None:
     before, after = case.diagnosis.model, case.diagnosis.final_model
-    known = on_machine(after, case.held, before)
-    assert known.worth is not None
-    page = case.write(tmp_path / "w.html", machine=known)
-    found = known.worth.axes["x"]
-    shown = page[page.index('<section id="worth"') :].partition("</section>")[0]
-    gain = typeset(quantity(found.gains["cogging"], "m"))
-    assert f"all but cogging fed forward, the RMS error is {gain} larger" in shown
-    for error in (found.without, found.before, found.diagnosed):
-        assert typeset(quantity(error.rms, "m")) in shown
+    worth = on_machine(after, case.held, before).worth
+    assert worth is not None
+    assert worth.axes["x"].gains["cogging"] > 0.0
     assert on_machine(after, case.held).worth is None  # nothing was found: nothing is gained
-
-
-def test_page_says_the_verdict_its_values_and_what_moved(case: Case, page: str) -> None:
-    text = Outline(page).text
-    best = case.x.best
-    assert best is not None
-    assert verdict_in_words(case.x) in text
-    assert "twin add cogging MODEL 'run 1' --holdout 'run 2' -o better.toml" in text
-    assert typeset(arrow(case.x.base.error, best.fit.error, "N")) in text
-    pitch = best.fit.axis["cogging"].values["p"]
-    assert f"p = {quantity(pitch, 'm')}" in text.replace("\u00a0", " ")
-    # The model without cogging is wrong, so it has no intervals; with cogging there is one column.
-    assert text.count("90 % interval") == 1
-    assert re.search(r"cogging\.p\s+–\s+[\d.]+ mm\s+[\d.]+ to [\d.]+", text)
-    assert case.addition.notes
-    assert all(note in text for note in case.addition.notes)
 
 
 def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
@@ -102,7 +96,7 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
     write_log(case.fit["run 1"], tmp_path / "run 1")
     source = Source("twin diagnose drive.toml 'run 1'", "drive.toml", tmp_path)
     faults, doubts = ["run 1: error: a gap"], ["run 2: warning: the clock jitters"]
-    page = case.write(tmp_path / "r.html", source=source, faults=faults, doubts=doubts)
+    page = case.write(tmp_path / "r.html", source=source, findings=[*faults, *doubts])
     text = Outline(page).text
     assert text.index("Axis x: cogging") < text.rindex("Notes") < text.index(doubts[0])
     assert text.index("Fault") < text.index("run 1: error: a gap") < text.index("Axis x: cogging")
@@ -181,7 +175,9 @@ def test_the_last_band_of_frequency_is_as_wide_as_it_is(case: Case) -> None:
 
 
 def test_a_comparison_alone_has_one_residual(case: Case, tmp_path: Path) -> None:
-    (axis,) = signals_in(case.write(tmp_path / "c.html", diagnosis=None, additions=()))
+    (axis,) = signals_in(
+        case.write(tmp_path / "c.html", result=case.diagnosis.comparison, additions=())
+    )
     assert axis["residuals"] == ["before"]
     assert axis["texts"]["model_before"] == "model"
     assert axis["texts"]["band"].startswith("the noise floor, ±")
@@ -206,17 +202,6 @@ def test_of_many_samples_no_extreme_is_lost() -> None:
     assert shown_of(signals, count)[1] == 1
 
 
-def test_the_floor_of_a_role_is_one_number_on_the_page(case: Case, page: str) -> None:
-    text = Outline(page).text
-    told = case.diagnosis.summaries["x"]
-    floors = {typeset(quantity(f, "N")) for f in told.floors.values()}
-    floors |= {f"{1e3 * f:.3g}" for f in told.floors.values()}
-    said = re.findall(r"(?:noise floor|floor)(?: of the force:)? ([\d.]+ m?N)", text)
-    assert said
-    assert set(said) <= floors
-    assert case.diagnosis.comparison.axes["x"].floor == told.floors[Role.TRAINING]
-
-
 def test_a_failure_leaves_the_old_report(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,3 +219,244 @@ def test_a_failure_leaves_the_old_report(
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(InputError, match="its folder does not exist"):
         case.write(tmp_path / "nowhere" / "report.html")
+
+
+def test_the_selection_error_is_one_number(case: Case) -> None:
+    (finding,), (cogging, *_) = case.x.findings, case.x.ranking
+    assert case.x.dataset.channel_delay > 0.0
+    assert case.x.chosen.before == pytest.approx(finding.tested.before)
+    assert case.x.chosen.before == pytest.approx(cogging.gain.before, rel=1e-3)
+
+
+def test_no_error_of_the_growth_is_below_the_floor_of_its_logs(case: Case) -> None:
+    (step,), floors = case.addition.model.history, case.diagnosis.summaries["x"].floors
+    for role, (_, after) in errors_of_step(step).items():
+        assert after >= (1.0 - 1e-3) * floors[role]
+
+
+def test_curves_are_those_of_the_final_model(case: Case) -> None:
+    x, drag = case.x, load_catalogue()["quadratic_drag"]
+    final = x.final.axis.with_effect(Fitted.at_start(drag, {"c": 2.0}))
+    fit = finished(final, x.base.axis, x.dataset.fit, Outcome.CONVERGED)
+    both = (*x.findings, replace(x.findings[0], effect=drag.name))
+    subject = case.subject(case.concluding(replace(x, final=fit, findings=both)))
+    (signals,) = explored(subject)
+    assert "effect quadratic_drag" in signals["effects"]
+    left = subject.views[0].signals.after
+    assert left is not None
+    kept = np.isfinite(left[: len(fit.kept)])  # of the training log, the first
+    np.testing.assert_allclose(left[: len(fit.kept)][kept], fit.residual, atol=1e-12)
+
+
+def test_intervals_that_the_text_refuses_are_not_in_the_model_file(
+    case: Case, tmp_path: Path
+) -> None:
+    fitted = workflow.fit(case.model, case.fit, case.held)
+    assert "no interval: the force error" in str(fitted)
+    given = load_written(fitted.model, tmp_path), load_written(case.addition.model, tmp_path)
+    refused, kept = (set(model.intervals["x"].ends) for model in given)
+    assert refused == set()
+    assert {"mass", "cogging.p", "cogging.a1"} <= kept
+
+
+def load_written(model: MachineModel, folder: Path) -> MachineModel:
+    save_model(model, folder / "m.toml")
+    return load_model(folder / "m.toml", load_catalogue())
+
+
+def test_the_residual_is_drawn_over_the_coordinate_of_the_answer_or_any_other(case: Case) -> None:
+    found = case.diagnosis
+    (own,) = found.plot().axes
+    assert own.get_xlabel().startswith("Cogging phase (")
+    (place,) = found.residual.against("position", axis="x").axes
+    assert (place.get_xlabel(), place.get_ylabel()) == ("Position (mm)", "Unexplained force (mN)")
+    dots, means, *_ = place.lines
+    errors = np.asarray(dots.get_ydata(), dtype=float)
+    rms = np.sqrt(np.nanmean(errors**2))  # of all logs, mN
+    assert 1e3 * min(found.summaries["x"].chosen.before, case.x.base.error) < rms < 80.0
+    assert np.nanmax(np.abs(np.asarray(means.get_ydata(), dtype=float))) < np.nanmax(np.abs(errors))
+    (alone,) = found.comparison.residual.against("time").axes
+    assert len(alone.lines) == 2  # of one model
+    for wrong in ({"coordinate": "phase"}, {"coordinate": "position", "axis": "y"}):
+        with pytest.raises(InputError, match=r"known are time, |no axis 'y' in the result"):
+            found.residual.against(**wrong)
+
+
+def test_hostile_names_are_text(case: Case, tmp_path: Path) -> None:
+    evil = '<script>alert(\'$1\')</script> & "x" onerror="y"'
+    own = replace(load_catalogue()["cogging"])
+    own.__dict__["name"] = "a$b^<i>$&c"  # what no file may be called
+    catalogue = Catalogue([own])
+    model = replace(case.model, name=evil)
+    logs = {evil: case.fit["run 1"]}
+    diagnosis = workflow.diagnose(model, logs, case.held, catalogue=catalogue)
+    step = replace(case.addition.step, effect=own.name, notes=(evil,))
+    page = case.write(
+        tmp_path / "evil.html", title=evil, result=diagnosis,
+        history=[step], additions=(),
+    )  # fmt: skip
+    outline = Outline(page)
+    assert "i" not in outline.tags
+    assert outline.tags.count("script") == 3  # the page's own
+    assert "onerror" not in {name for name, _ in outline.attributes}
+    assert outline.text.count(evil) >= 5  # title twice, model, log, note
+    assert f"Axis x: {own.name} is missing" in outline.text
+    signals = json.loads(re.findall(r'id="signals">(.*?)</script>', page, re.DOTALL)[0])
+    assert own.name in [one["label"] for one in signals[0]["signals"]]
+    assert signals[0]["logs"][0]["title"] == f"{evil} (training)"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.02, "N", "20.0 mN"),
+        (-3.3e-4, "s", "−330 µs"),
+        (1e-9, "m", "1.00 nm"),
+        (1.234e-3, "kg", "0.00123 kg"),
+        (0.018, "N s/m", "0.0180 N·s/m"),
+        (2.0, "1", "2.00"),
+        (0.0, "m", "0 m"),
+        (9.87e-4, "kg", "9.87×10⁻⁴ kg"),
+        (-1.234e7, "N/m^2", "−1.23×10⁷ N/m²"),
+        (1234567.0, "N/m^2", "1234567 N/m²"),
+        (4e-17, "N s^2/m^2", "4.00×10⁻¹⁷ N·s²/m²"),
+        (None, "N", "–"),
+        (float("nan"), "N", "–"),
+        (float("inf"), "N", "∞ N"),
+    ],
+)
+def test_numbers_with_units(value: float | None, unit: str, text: str) -> None:
+    assert typeset(quantity(value, unit)) == text
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("open-loop: -0.5 +- 2e-05 m of 4 um", "Open-loop: −0.5 ± 2×10⁻⁵ m of 4 µm."),
+        ("sigma0 is off (-3.6e+03 %)", "sigma0 is off (−3.6×10³ %)."),
+        ("payload_mass would make 1-2 N.", "payload_mass would make 1-2 N."),
+    ],
+)
+def test_a_sentence_of_the_terminal_is_typeset_on_a_page(said: str, printed: str) -> None:
+    assert typeset(capitalised(said)) == printed
+
+
+@pytest.mark.parametrize("unit", ["N", "kg"])
+def test_a_scale_keeps_the_value(unit: str) -> None:
+    for value in (3.21e-8, 4.9e-4, 5.1e-4, 0.49, 0.51, 23.0):
+        scale = Scale.of(unit, [value, -value / 3.0])
+        assert scale(value) * scale.size == pytest.approx(value)
+        prefixed = {1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}[scale.size]
+        assert scale.unit == prefixed + unit
+        assert unit == "kg" or scale(value) >= 0.5
+        assert unit == "kg" or scale.size == 1.0 or scale(value) < 500.0
+    assert Scale.of(unit, []).size == 1.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "ends", "values", "printed"),
+    [
+        ("m", (0.02698, 0.02702), (0.02698, 0.027, 0.02702), ["26.980", "27.000", "27.020"]),
+        ("N", (-1.0, 1.0), (-0.01, 1.0), ["0.0", "1.0"]),
+        ("N", (1.0, 1.0), (1.0,), ["1.00"]),
+        ("kg m^2", (4.740e-6, 4.795e-6), (4.740e-6, 4.768e-6), ["4.740e-06", "4.768e-06"]),
+    ],
+)
+def test_an_interval_has_two_digits_of_its_half_width(unit, ends, values, printed) -> None:
+    assert Scale.of(unit, [values[-1]]).within(*ends, *values) == printed
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"low": 0.0, "high": 1.5}, "moving forwards"),
+        ({"low": -1.5, "high": 0.0}, "moving backwards"),
+        ({"coordinate": "standstill", "unit": "1", "low": 0.0, "high": 1.0}, "in motion"),
+        ({"coordinate": "standstill", "unit": "1", "low": 1.0, "high": 2.0}, "at standstill"),
+        (
+            {"coordinate": "position", "unit": "m", "low": 0.01131, "high": 0.01157},
+            "position between 11.31 and 11.57 mm",
+        ),
+    ],
+)
+def test_a_place_is_named_with_the_digits_of_its_width(changed, said):
+    _, back = made.comparison_of().worst
+    assert place_in_words(replace(back, **changed)) == said
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (None, "the explanations differ most at"),
+        (0.049, "missing motion: speed"),
+        (0.051, "no motion is missing"),
+    ],
+)
+def test_a_gap_is_missing_where_few_of_the_data_are(share, said) -> None:
+    assert gap_in_words(Gap("speed", "m/s", 0.01, 0.05, share)).startswith(said)
+
+
+@pytest.mark.parametrize(("folded", "told"), [(0.038, True), (0.02, False), (0.0, False)])
+def test_a_thinned_log_is_told_with_what_to_log_instead(folded: float, told: bool) -> None:
+    noise = NoiseFloor(0.04, 0.03, 0.05, {"sensors": 0.01, "aliasing": folded})
+    said = aliasing_in_words(noise, LINEAR) or ""
+    assert bool(said) is told
+    assert ("38.0 mN of the noise floor of 40.0 mN" in said) is told
+    assert ("log at the control rate, or the drive's averaged current" in said) is told
+
+
+def test_an_experiment_in_short_has_the_units_of_its_parameters() -> None:
+    rests = Rests("y", 0.0021, 0.0043, (0.1, 0.75), effort=0.25)
+    assert in_short(rests) == (
+        "rests: axis y, effort 0.25, span 0.0021 m, speed 0.0043 m/s, rests 0.1 0.75 s"
+    )
+
+
+def test_why_an_axis_was_chosen_is_said() -> None:
+    both = ("x", "y")
+    assert axis_in_words("wear", "x", ["x"], []) is None
+    taken = "axis x has wear already, so it went to axis y"
+    assert axis_in_words("wear", "y", both, ["x"]) == taken
+    most = "of axes x, y, axis y has the most evidence for it"
+    assert axis_in_words("wear", "y", both, []) == most
+
+
+def test_numbers_that_differ_look_different_and_a_ratio_has_no_unit() -> None:
+    moved = moved_in_words(replace(made.MOVED, before=15.2004, after=15.2021))
+    assert moved == "mass moved from 15.200 to 15.202 kg: more than its uncertainty"
+    assert "from 15.2 to 15.2 kg" in moved_in_words(replace(made.MOVED, before=15.2, after=15.2))
+    ratio = replace(made.MOVED, before=0.2261, after=0.201, unit="1", collapsed=False)
+    assert " moved from 0.226 to 0.201: more than" in moved_in_words(ratio)
+    assert (quantity(0.5, "1"), span(1.0, 2.0, "1")) == ("0.500", "1.00 and 2.00")
+
+
+def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> None:
+    moved = MovedParameter("mass", 5.0, 5.5, "kg", False)
+    gone = MovedParameter("constant_force.F0", 0.3, 0.01, "N", True)
+    added = built("cogging", fit=built_fit(0.1, axis=axis_of(fitted("cogging"))))
+    step = HistoryStep("add", "cogging", "x", 3.0, 2.0, 3.1, 2.1)
+    reshaped = replace(step, action="shape", effect="coulomb_viscous")  # which the axis still has
+
+    def notes(candidate, moved=(), gone=(), step=step):
+        return notes_in_words(Addition(None, step, candidate, True, None, None, moved, gone))[0]
+
+    assert notes(added, (moved, gone), ("empirical_map",)) == (
+        "mass moved from 5.00 to 5.50 kg: more than its uncertainty",
+        "constant_force.F0 collapsed from 300 to 10.0 mN: it had taken over the missing effect's "
+        "force",
+        "empirical_map was removed before cogging was added; add it again for the error that is "
+        "left",
+    )
+    assert notes(added) == ()
+    assert notes(added, step=reshaped) == (
+        "cogging is beside the law of coulomb_viscous; the force is that of both, so do not read "
+        "the law's values alone",
+    )
+    replaced = replace(reshaped, effect="roller_spikes")
+    instead, note = notes(added, (moved,), ("empirical_map",), replaced)
+    assert instead == "cogging is in the place of the law of roller_spikes"
+    assert note.startswith("mass moved")
+    curve = built("empirical_map", fit=built_fit(0.1, axis=axis_of(fitted("empirical_map"))))
+    told, note = notes(curve, (moved,))
+    assert told.startswith("empirical_map is a fitted curve, not a physical law")
+    assert note.startswith("mass moved")

@@ -199,7 +199,7 @@ def test_five_logs_of_a_million_and_a_half_samples(case: Case, tmp_path: Path) -
     few = Catalogue([catalogue["cogging"]])
     found = workflow.diagnose(case.model, logs, held, test, catalogue=few)
     path = tmp_path / "long.html"
-    case.write(path, diagnosis=found, comparison=found.comparison, additions=())
+    case.write(path, result=found, additions=())
     with browser(tmp_path) as running:
         paints = []
         for _ in range(5):

@@ -18,7 +18,7 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import UNITS
-from identify.output.words.residual import region_in_words
+from identify.output.words.fit import region_in_words
 from identify.validation.comparison import compare_axis
 from identify.validation.misfit_maps import (
     ABOVE_FLOOR,

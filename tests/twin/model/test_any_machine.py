@@ -84,7 +84,7 @@ def gone_round(request, tmp_path_factory) -> Round:
 def page(r: Round, path: Path) -> str:
     """All that a reader of the report sees, in its plots too."""
     history = r.added.model.history
-    write_report(path, Subject("machine", r.found, r.found.comparison, history, [r.added]))
+    write_report(path, Subject("machine", r.found, history, [r.added]))
     written = path.read_text()
     drawn = [json.loads(html.unescape(d)) for d in re.findall(r'data-chart="([^"]+)"', written)]
     signals = re.search(r'id="signals">(.*?)</script>', written, re.DOTALL)

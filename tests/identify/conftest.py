@@ -1,4 +1,4 @@
-"""The diagnosed drive whose report, texts and tables the tests read."""
+"""The diagnosed drive whose report, texts and roles the tests read."""
 
 import pytest
 from report_cases import Case, cogging_case
