@@ -159,11 +159,14 @@ def new(
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
+    having: dict[str, list[str]] = {}
+    for axis, labels in unknown.items():
+        for label in labels:
+            having.setdefault(label, []).append(axis)
     notes = [
-        f"axis {axis}: {label} is not determined, as the axis does not break away from rest by "
-        "more than its Coulomb friction; it is set to that"
-        for axis, labels in unknown.items()
-        for label in labels
+        f"{'axis' if len(axes) == 1 else 'axes'} {', '.join(axes)}: {label} is not determined, as "
+        "no break away from rest takes more than Coulomb friction; it is set to that"
+        for label, axes in having.items()
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)

@@ -167,7 +167,7 @@ def test_the_commands_of_a_new_machine(tmp_path):
     ):
         done = twin(*command, folder=tmp_path)
         assert done.returncode == 0, done.stderr
-    assert "axis x: coulomb_viscous.Fs is not determined, as the axis does not" in done.stdout
+    assert "axis x: coulomb_viscous.Fs is not determined, as no break away" in done.stdout
     axis = load_model(str(tmp_path / "model.toml"), CATALOGUE).axes["x"]
     assert axis.mass == pytest.approx(MASS, rel=0.05)
     for wrong in (("import", "run.csv"), ("import", "--guess", "run.csv", "run.csv")):

@@ -69,7 +69,7 @@ class FitEntry(Entry):
     left_out: list[str] = read("still")
     """Logs in which the axis stands still."""
     force_noise: Number
-    """Force that no sensor makes and nothing measured foretells, RMS."""
+    """Force that no sensor makes and nothing measured predicts, RMS."""
     force_shift: Number = read("channel_delay")
     force_shift_unit: str = "s"
     beginnings_left_out: dict[str, Number]
