@@ -150,7 +150,7 @@ def test_what_cannot_be_fed_forward_is_told(tmp_path) -> None:
     stage = load_model("proton_xy", CATALOGUE)
     axis = stage.axes["x"].with_effect(AXES["encoder_ripple"]["encoder_ripple"])
     made = c_source(stage.with_axis("x", axis))
-    assert [(r.axis, r.part) for r in made.lost] == [("x", "encoder_ripple")]
+    assert [(a.name, r.part) for a in made.axes for r in a.held.lost] == [("x", "encoder_ripple")]
     assert "Lost: encoder_ripple, it changes the reading" in made.header
     assert "encoder_ripple" not in made.source
 

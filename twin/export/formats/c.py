@@ -13,7 +13,7 @@ from math import ceil
 from twin.core.native import LONGEST_STEP
 from twin.effect import IO_SIZE, Effect, Kind
 from twin.errors import InputError
-from twin.export import Exported, Exporter, Remark, axis_identifiers, filled, identifier
+from twin.export import Exported, Exporter, Held, Remark, axis_identifiers, filled, identifier
 from twin.export.c_law import SLOTS, CannotTranslate, CLaws
 from twin.feedforward import followed
 from twin.logs import Log
@@ -58,6 +58,8 @@ class AxisCode:
     """By how much the setpoint has to come early, s."""
     ends: dict[str, tuple[float, float]]
     """90 % intervals by the label of a parameter."""
+    held: Held
+    """What becomes of its effects."""
 
     @property
     def reads_other(self) -> bool:
@@ -106,23 +108,12 @@ class AxisCode:
 
 @dataclass(frozen=True)
 class CSource:
-    """The two files of a machine, and what they lack of it."""
+    """The two files of a machine."""
 
     name: str
     header: str
     source: str
     axes: tuple[AxisCode, ...]
-    approximated: tuple[Remark, ...]
-    lost: tuple[Remark, ...]
-
-    @property
-    def kept(self) -> dict[str, tuple[str, ...]]:
-        """By axis, what is kept as it is."""
-        less, kept = {(r.axis, r.part) for r in (*self.approximated, *self.lost)}, {}
-        for a in self.axes:
-            effects = (n for n in a.axis.names if (a.name, n) not in less)
-            kept[a.name] = (a.axis.units.mass_name, *effects)
-        return kept
 
 
 def c_source(model: MachineModel) -> CSource:
@@ -134,7 +125,7 @@ def c_source(model: MachineModel) -> CSource:
         )
     model.require_mass()
     name, names, laws = identifier(model.name), axis_identifiers(model), CLaws()
-    axes, approximated, lost = list[AxisCode](), list[Remark](), list[Remark]()
+    axes = []
     for axis_name, axis in model.axes.items():
         found = followed(axis)
         made, left = [], dict(found.lost)
@@ -148,30 +139,34 @@ def c_source(model: MachineModel) -> CSource:
         for law in made:
             if law.effect.kind is Kind.STRUCTURE and model.period > LONGEST_STEP:
                 nearly[law.name] = "the acceleration is held from one call to the next"
-        approximated += [Remark(axis_name, *item) for item in nearly.items()]
-        lost += [Remark(axis_name, *item) for item in left.items()]
+        kept = (n for n in found.axis.names if n not in nearly and n not in left)
+        held = Held(
+            (axis.units.mass_name, *kept),
+            tuple(Remark(axis_name, *item) for item in nearly.items()),
+            tuple(Remark(axis_name, *item) for item in left.items()),
+        )
         intervals = model.intervals.get(axis_name)
         axes.append(
             AxisCode(
                 axis_name, f"{name}_{names[axis_name]}", found.axis, tuple(made), model.period,
-                found.ahead(model.period), dict(intervals.ends) if intervals else {},
+                found.ahead(model.period), dict(intervals.ends) if intervals else {}, held,
             )
         )  # fmt: skip
     header, source = (
         filled(
-            f"model.{kind}", model=model, name=name, axes=axes, approximated=approximated,
-            lost=lost, laws=laws.text, slots=SLOTS, io_size=IO_SIZE, imposed=IMPOSED,
+            f"model.{kind}", model=model, name=name, axes=axes, laws=laws.text, slots=SLOTS,
+            io_size=IO_SIZE, imposed=IMPOSED,
         )
         for kind in ("h", "c")
     )  # fmt: skip
-    return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))
+    return CSource(name, header, source, tuple(axes))
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """A header and a source file."""
     made = c_source(model)
-    files: dict[str, str | bytes] = {f"{made.name}.h": made.header, f"{made.name}.c": made.source}
-    return Exported(files, made.kept, made.approximated, made.lost)
+    files = {f"{made.name}.h": made.header, f"{made.name}.c": made.source}
+    return Exported(files, {a.name: a.held for a in made.axes})
 
 
 EXPORTER = Exporter(
