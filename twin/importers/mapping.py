@@ -367,7 +367,7 @@ class ImportMap(_File):
         if self.time is not None and self.sample_rate is not None:
             raise InputError("sample_rate and time are both given; give one of them")
         if self.files is not None:
-            self._require_clocks(self.files)
+            self._require_time_bases(self.files)
         elif self.resample is not None and self.time is None:
             raise InputError('resample needs the times; give time = {column = "t", unit = "s"} too')
         for name, axis in self.axes.items():
@@ -380,7 +380,7 @@ class ImportMap(_File):
         if most > max(count, 1):
             raise InputError(f"file = {most}: the map has {count} [[files]] tables; add one")
 
-    def _require_clocks(self, files: list[FileMap]) -> None:
+    def _require_time_bases(self, files: list[FileMap]) -> None:
         if self.time is not None or self.sample_rate is not None:
             raise InputError(
                 "time and sample_rate are those of each file; give them under [[files]]"
