@@ -231,9 +231,7 @@ class Axis:
         Then the position falls short of its setpoint under a load, and no scale is wrong. With a
         wrong one the loop, which knows better, weighs setpoint and position differently.
         """
-        setpoint = self.log.columns.get("setpoint_position")
-        if setpoint is None:
-            return False
+        setpoint = self.log.columns["setpoint_position"]
         goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
         falls_short = 0.8  # of the setpoint's spread, up to which a position falls short of it
         if np.std(position) > falls_short * np.std(goal):

@@ -271,12 +271,8 @@ def test_the_emps_drive_is_imported(shared_data: Path) -> None:
 @pytest.mark.parametrize("delay", [-23, -22, 22])
 def test_a_delay_may_leave_two_samples_and_no_fewer(tmp_path, delay):
     write_csv(tmp_path / "log.csv", {"q": np.arange(ROWS) + 1.0, "u": np.arange(ROWS) + 50.0})
-    text = f"""
-sample_rate = 100.0
-[axes.x]
-position = {{column = "q", unit = "m", delay_samples = {delay}}}
-force = {{column = "u", unit = "N"}}
-"""
+    text = map_of("q", "u", units=("m", "N"))
+    text = text.replace('"q"', f'"q", delay_samples = {delay}')
     left = ROWS - abs(delay)
     if left < 2:
         with pytest.raises(InputError, match=f"delay_samples of {min(0, delay)} to"):
@@ -324,10 +320,7 @@ def test_a_scale_may_be_a_scalar_of_the_file(tmp_path: Path) -> None:
     raw = np.sin(np.arange(50.0))
     file = tmp_path / "run.mat"
     write_mat(file, {"q": raw, "u": 2.0 * raw})  # and gain = 3
-    text = (
-        "sample_rate = 100.0\n[axes.x]\nposition = {column = 'q', unit = 'm'}\n"
-        "force = {column = 'u', unit = 'V', scale = 'gain'}\n"
-    )
+    text = map_of("q", "u", units=("m", "V")).replace('"u"', '"u", scale = "gain"')
     assert import_log(file, mapping(tmp_path, text)).axes["x"].force == pytest.approx(6.0 * raw)
     for name, said in (("q", "name a scalar"), ("gian", "no column 'gian'; did you mean 'gain'")):
         with pytest.raises(InputError, match=said):

@@ -201,8 +201,7 @@ def test_import_check_and_the_report_say_it(guessed):
 def test_import_says_where_a_name_has_another_unit_and_where_no_force_can_be(
     tmp_path: Path, current: str, said: str
 ) -> None:
-    rows = "\n".join(f"{np.sin(0.01 * k)},{np.cos(0.01 * k)}" for k in range(1000))
-    (tmp_path / "a.csv").write_text(f"x_m,i [A]\n{rows}\n")
+    write_csv(tmp_path / "a.csv", {"x_m": Q, "i [A]": F})
     position = 'position = {column = "x_m", unit = "mm"}'  # which may be a motor's, no length
     text = f"sample_rate = 1000.0\n[axes.x]\n{position}\ncurrent = {current}\n"
     (tmp_path / "map.toml").write_text(text)
