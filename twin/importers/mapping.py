@@ -147,11 +147,6 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def field_unit(field: str, text: str) -> Unit:
-    """The unit of a log field, of a linear or a rotary axis; raises InputError."""
-    return find_unit(text, *dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field])))
-
-
 # --- the map --------------------------------------------------------------------------------------
 
 NUMBER = "a finite number"
@@ -212,7 +207,8 @@ class ColumnMap(_Column):
 
     def require_unit(self, field: str) -> None:
         """Find the unit, of a signal of that name; raises InputError where there is none."""
-        self._si = field_unit(field, self.unit)
+        either = dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field]))
+        self._si = find_unit(self.unit, *either)
         if self.si.si is None and "scale" not in self.model_fields_set:
             raise InputError(f"unit '{self.unit}' needs a scale: how much one of it is in SI")
         if self.scale == 0.0:
