@@ -187,7 +187,10 @@ class ReducedSimulator:
         )  # fmt: skip
 
 
-def quickest(model: MachineModel) -> type[MujocoSimulator] | type[ReducedSimulator]:
+Simulator = type[MujocoSimulator] | type[ReducedSimulator]
+
+
+def quickest(model: MachineModel) -> Simulator:
     """The reduced model; MuJoCo where the axes are joints, which move each other."""
     return MujocoSimulator if model.joints else ReducedSimulator
 
@@ -203,7 +206,7 @@ def run(
     setpoint: AnySetpoint,
     rng: np.random.Generator,
     *,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Run:
@@ -226,7 +229,7 @@ def run_parts(
     setpoint: AnySetpoint,
     rng: np.random.Generator,
     *,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Run]:

@@ -36,7 +36,7 @@ from twin.logs import Log
 from twin.logs.log import joined
 from twin.model.machine import MachineModel
 from twin.numbers import neat, require_seed
-from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
+from twin.simulator import MujocoSimulator, Progress, Simulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
 DURATION = 20.0  # s
@@ -194,7 +194,7 @@ def simulate(
     seed: int = 0,
     duration: float | None = None,
     axis: str | None = None,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     progress: Progress | None = None,
 ) -> Log:
     """Run an experiment on the twin and return its log, with the truth topics.
@@ -219,7 +219,7 @@ def simulate_parts(
     seed: int = 0,
     duration: float | None = None,
     axis: str | None = None,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     progress: Progress | None = None,
 ) -> Iterator[Log]:
     """``simulate`` in parts of two seconds or so, to be recorded while the twin runs."""
