@@ -177,31 +177,12 @@ def _anywhere(case: Case, rng: np.random.Generator) -> int:
     return int(rng.integers(case.chunks[0].start, case.chunks[-1].end))
 
 
-def _a_chunk(rng: np.random.Generator) -> int:
-    return int(rng.integers(CHUNKS))
-
-
-def a_bit(case: Case, rng: np.random.Generator) -> Damage:
-    place = _anywhere(case, rng)
-    return _overwritten(case, place, bytes([case.data[place] ^ 1 << int(rng.integers(8))]))
-
-
 def zeros(case: Case, rng: np.random.Generator) -> Damage:
     return _overwritten(case, _anywhere(case, rng), bytes(int(rng.integers(1, 600))))
 
 
 def noise(case: Case, rng: np.random.Generator) -> Damage:
     return _overwritten(case, _anywhere(case, rng), rng.bytes(int(rng.integers(1, 600))))
-
-
-def a_length(case: Case, rng: np.random.Generator) -> Damage:
-    place = case.chunks[_a_chunk(rng)].start + 1 + int(rng.integers(8))
-    return _overwritten(case, place, rng.bytes(1))
-
-
-def a_cut(case: Case, rng: np.random.Generator) -> Damage:
-    place = _anywhere(case, rng)
-    return case.data[:place], {i for i, c in enumerate(case.chunks) if c.end > place}
 
 
 def bytes_gone(case: Case, rng: np.random.Generator) -> Damage:
@@ -225,20 +206,16 @@ def swapped(case: Case, rng: np.random.Generator) -> Damage:
 
 
 def doubled(case: Case, rng: np.random.Generator) -> Damage:
-    i = _a_chunk(rng)
+    i = int(rng.integers(CHUNKS))
     start, end = case.chunks[i].start, case.behind(i)
     return case.data[:end] + case.data[start:end] + case.data[end:], set()
 
 
-def no_checksum(case: Case, rng: np.random.Generator) -> Damage:
-    i = _a_chunk(rng)
-    start, end = case.chunks[i].start, case.chunks[i].end
-    data = bytearray(case.data)
-    data[start + CRC_AT : start + CRC_AT + 4] = bytes(4)
-    data[int(rng.integers(start + 60, end))] ^= 1 << int(rng.integers(8))
-    return bytes(data), {i}
-
-
 DRAWN: tuple[Callable[[Case, np.random.Generator], Damage], ...] = (
-    a_bit, zeros, noise, a_length, a_cut, bytes_gone, bytes_more, swapped, doubled, no_checksum,
-)  # fmt: skip
+    zeros,
+    noise,
+    bytes_gone,
+    bytes_more,
+    swapped,
+    doubled,
+)
