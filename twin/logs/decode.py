@@ -133,7 +133,7 @@ def log_parts(
     file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
 ) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""
-    run, told = Run(file, wanted), False
+    run, told = Run(file, wanted, samples), False
     for _ in run.fed(records):
         if samples is not None and run.holds(samples):
             yield run.log()
@@ -186,9 +186,9 @@ def checksum(metadata: Mapping[str, str]) -> str:
 
 
 class Run:
-    """The samples of a file as they arrive, and extras."""
+    """The samples of a file as they arrive, of a topic so many at once (None: all), and extras."""
 
-    def __init__(self, file: McapFile, wanted: Wanted) -> None:
+    def __init__(self, file: McapFile, wanted: Wanted, samples: int | None = None) -> None:
         self._extras = Extras()
         self._topics = Topics()
         self._size = file.size
@@ -200,6 +200,8 @@ class Run:
             c.id for c in file.channels()
             if (file.counts or {}).get(c.id, 0) and wanted.takes(c.topic)
         }  # fmt: skip
+        # room for no more samples than bytes in the file, whatever its statistics say
+        self._room = file.size if samples is None else min(file.size, samples + (samples >> 4))
         self._series: dict[int, Series] = {}
 
     def fed(self, records: Iterable[Record]) -> Iterator[None]:
@@ -231,8 +233,9 @@ class Run:
         if any(s.topic.name == topic.name for s in self._series.values()):
             raise InputError(f"two channels have the topic {topic.name}; write one a topic")
         with at(topic.name):
+            room = min((self._counts or {}).get(block.channel, 0), self._room)
             fields = None if topic.is_truth else self._wanted.fields
-            self._series[block.channel] = Series(topic, fields)
+            self._series[block.channel] = Series(topic, room, fields)
         return self._series[block.channel]
 
     def _opened(self) -> list[Series]:

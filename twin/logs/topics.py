@@ -375,17 +375,19 @@ def instant(time: float) -> str:
 class Series:
     """Columns of one topic; ``append`` refuses what is not evenly spaced and finite.
 
-    wanted: the fields that are kept, None for all. start: time of the first sample in ns; ``count``
-    samples were taken, of which the last ``held`` are held; rate in Hz.
+    capacity: samples expected at once; more are taken too. wanted: the fields that are kept, None
+    for all. start: time of the first sample in ns; ``count`` samples were taken, of which the last
+    ``held`` are in the columns; rate in Hz.
     """
 
-    def __init__(self, topic: Topic, wanted: Collection[str] | None = None) -> None:
+    def __init__(self, topic: Topic, capacity: int, wanted: Collection[str] | None = None) -> None:
         self.topic = topic
         self.rate = topic.sample_rate
         self.start = self.count = self.held = 0
         self._first_sequence = 0
-        fields = (f for f in topic.fields if wanted is None or f in wanted)
-        self._pieces: dict[str, list[Array]] = {name: [] for name in fields}
+        self._capacity = capacity
+        self._fields = [f for f in topic.fields if wanted is None or f in wanted]
+        self._columns: dict[str, Array] = {}
 
     @property
     def span(self) -> range:
@@ -400,19 +402,25 @@ class Series:
             self._first_sequence = int(block.sequence[0])
         first = self._first_sequence + self.count
         require_even(self.topic, block, first, self.start, self.count)
-        for name, pieces in self._pieces.items():
+        size = len(block.log_time)
+        need = self.held + size
+        if not self._columns:
+            self._columns = {name: np.empty(max(need, self._capacity)) for name in self._fields}
+        for name, column in self._columns.items():
+            if need > len(column):
+                self._columns[name] = np.empty(max(need, 2 * len(column)))
+                self._columns[name][: self.held] = column[: self.held]
+            self._columns[name][self.held : need] = block.columns[name]
             require_finite(self.topic, block, name, self.count)
-            pieces.append(block.columns[name].copy())  # else the whole chunk is held
-        self.count += len(block.log_time)
-        self.held += len(block.log_time)
+        self.count += size
+        self.held = need
 
     def taken(self) -> dict[str, Array]:
         """The samples that are held, of every field; from here on only new ones are."""
-        columns = {}
-        for name, pieces in self._pieces.items():  # one by one, so that one alone is held twice
-            columns[name] = np.concatenate(pieces or [np.empty(0)])
-            pieces.clear()
-        self.held = 0
+        columns = self._columns
+        for name, column in columns.items():  # one by one, so that one alone is held twice
+            columns[name] = column if len(column) == self.held else column[: self.held].copy()
+        self._columns, self.held = {}, 0
         return columns
 
 
