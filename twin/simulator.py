@@ -215,13 +215,17 @@ def run(
     rng draws the encoder noise. controllers: by axis; the model's own bandwidths where None. Raises
     CannotRun where the simulation breaks down.
     """
-    parts = list(
-        run_parts(
-            model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
-        )
-    )
-    signals, forces, states = map(np.concatenate, zip(*(p.arrays for p in parts), strict=True))
-    return replace(parts[0], signals=signals, forces=forces, states=states)
+    whole: Run | None = None
+    done = 0
+    for part in run_parts(
+        model, setpoint, rng, simulator=simulator, controllers=controllers, progress=progress
+    ):
+        whole = _empty(part, len(setpoint)) if whole is None else whole
+        for column, new in zip(whole.arrays, part.arrays, strict=True):
+            column[done : done + len(part)] = new
+        done += len(part)
+    assert whole is not None
+    return whole
 
 
 def run_parts(
