@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
-
 from twin.checks import CheckReport, Fault, Finding
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
@@ -34,12 +32,6 @@ def with_axis(log: Log, name: str, change: Callable[[Columns], Mapping[str, Arra
     axis = log.axes[name]
     columns = dict(change({n: c.copy() for n, c in axis.columns.items()}))
     return replace(log, axes={name: replace(axis, columns=columns)})
-
-
-def late(samples: int, *names: str) -> Callable[[Columns], Columns]:
-    """Some columns recorded late (early where negative), the ends cut off."""
-    cut = slice(abs(samples), -abs(samples))
-    return lambda c: {n: (np.roll(v, samples) if n in names else v)[cut] for n, v in c.items()}
 
 
 def only(report: CheckReport, fault: Fault) -> Finding:

@@ -58,6 +58,13 @@ def write_csv(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",") 
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def csv_columns(text: str) -> dict[str, np.ndarray]:
+    """The columns of a text table by name."""
+    head, *rows = text.splitlines()
+    columns = np.loadtxt(rows, delimiter=",", ndmin=2).T
+    return dict(zip(head.split(","), columns, strict=True))
+
+
 def write_mat(path: Path, columns: dict[str, np.ndarray]) -> None:
     savemat(path, {**columns, "gain": 3.0, "title": "run 7"})
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -76,9 +78,9 @@ def shown(value: object) -> str:
 
 def _sentence(kind: type[Entries], document: Any, error: str, place: tuple[str | int, ...]) -> str:
     if place[-1] == NAME_OF_TABLE:
-        where, _, field, _ = _walk(kind, document, place[:-2])
+        where, _, field, _ = _walk(kind, place[:-2])
         return f"{'.'.join(where)}.{place[-2]}: give {field.description if field else ''}"
-    where, owner, field, value = _walk(kind, document, place)
+    where, owner, field, depth = _walk(kind, place)
     key, prefix = (where[-1] if where else ""), "".join(f"{part}: " for part in where[:-1])
     if error == "extra_forbidden" and owner is not None:
         known = list(owner.model_fields)
@@ -89,17 +91,18 @@ def _sentence(kind: type[Entries], document: Any, error: str, place: tuple[str |
     wanted = (field.description if field else None) or "a table, as [...] or {...}"
     if error == "missing":
         return f"{prefix}has no {key}; give {wanted}"
+    value: Any = reduce(getitem, place[:depth], document)
     return f"{prefix}{key} = {shown(value)}: give {wanted}"
 
 
 def _walk(
-    kind: Any, value: Any, place: tuple[str | int, ...]
-) -> tuple[list[str], type[Entries] | None, FieldInfo | None, Any]:
-    """Down to an error: the path in words, the table and the field there, and the value given."""
+    kind: Any, place: tuple[str | int, ...]
+) -> tuple[list[str], type[Entries] | None, FieldInfo | None, int]:
+    """Down to an error: the path in words, the table and the field there, and how deep they are."""
     where: list[str] = []
     owner: type[Entries] | None = None
     field: FieldInfo | None = None
-    for i, key in enumerate(place):
+    for depth, key in enumerate(place):
         table = _table_of(kind)
         if table is not None:
             owner, field = table, table.model_fields.get(str(key))
@@ -109,9 +112,8 @@ def _walk(
             where[-1] += f".{key}"
             kind = _inner(kind)
         else:  # within a plain list: the whole list is shown
-            break
-        value = _child(value, key) if i < len(place) else value
-    return where, owner, field, value
+            return where, owner, field, depth
+    return where, owner, field, len(place)
 
 
 def _inner(kind: Any) -> Any:
@@ -125,10 +127,3 @@ def _table_of(kind: Any) -> type[Entries] | None:
         if isinstance(option, type) and issubclass(option, Entries):
             return option if get_origin(kind) not in (dict, list) else None
     return None
-
-
-def _child(value: Any, key: str | int) -> Any:
-    try:
-        return value[key]
-    except (KeyError, IndexError, TypeError):
-        return None

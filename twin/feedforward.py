@@ -119,7 +119,7 @@ def feedforward(axis: AxisModel, motion: Array, others: Array, period: float) ->
     inertia = axis.mass * motion[2]
 
     def force(of: AxisModel, command: Array) -> Array:
-        return _force(of, np.stack([*motion[:2], command]), others, period)
+        return imposed(of, np.stack([*motion[:2], command]), others, period)
 
     # What friction has to hold at rest is the command less the forces, so these come first.
     needed = inertia - force(_having(kept, lambda kind: kind is Kind.FORCE), inertia)
@@ -141,7 +141,7 @@ def _having(axis: AxisModel, wanted: Callable[[Kind], bool]) -> AxisModel:
     return replace(axis, effects=tuple(f for f in axis.effects if wanted(f.effect.kind)))
 
 
-def _force(axis: AxisModel, motion: Array, others: Array, period: float) -> Array:
+def imposed(axis: AxisModel, motion: Array, others: Array, period: float) -> Array:
     """Force of all effects along an imposed motion, (n,) N; motion (3, n): m, m/s, command N."""
     table = axis_table({"axis": axis})
     first, last, at, _, _ = table.axes[0]

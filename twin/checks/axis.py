@@ -20,7 +20,7 @@ from twin.checks.explain import (
 )
 from twin.checks.report import WHOLE, Fault, Finding, Severity
 from twin.logs.log import AxisLog
-from twin.signals import Array, median, usual_size, white_noise
+from twin.signals import Array, median, stretches, usual_size, white_noise
 
 PHYSICAL = 10e-3  # s of lag, what a slow drive may account for
 READINGS = ("position", "velocity", "current", "force")
@@ -136,17 +136,17 @@ class Axis:
         return np.where(second > self.possible_jump, second, 0.0)
 
     @cached_property
-    def bends(self) -> NDArray[np.intp]:
-        """(k,) samples at which the position bends impossibly."""
+    def curved_at(self) -> NDArray[np.intp]:
+        """(k,) samples at which the second difference of the position is impossible."""
         return np.flatnonzero(self.jumps) + 1
 
     @cached_property
     def kept(self) -> Array:
         """(m,) 1.0 where the motion has no impossible jumps, else 0.0; 1.0 if little is left."""
-        if not len(self.bends):
+        if not len(self.curved_at):
             return np.ones(len(self.velocity))
         jumps = np.zeros(len(self.log))
-        jumps[self.bends] = 1.0
+        jumps[self.curved_at] = 1.0
         hit = np.convolve(jumps, np.ones(4 * self.smoother.samples + 1), "same")
         free = self.smoother.held((hit > 0.5).astype(float)) == 0.0
         return free.astype(float) if free.mean() > 0.5 else np.ones(len(free))
@@ -231,9 +231,7 @@ class Axis:
         Then the position falls short of its setpoint under a load, and no scale is wrong. With a
         wrong one the loop, which knows better, weighs setpoint and position differently.
         """
-        setpoint = self.log.columns.get("setpoint_position")
-        if setpoint is None:
-            return False
+        setpoint = self.log.columns["setpoint_position"]
         goal, position = self.smoother.position(setpoint), self.smoother.position(self.log.position)
         falls_short = 0.8  # of the setpoint's spread, up to which a position falls short of it
         if np.std(position) > falls_short * np.std(goal):
@@ -274,8 +272,7 @@ def count_of(signal: Array) -> float:
 
     It passes a few samples between, where it was resampled. 0 where no count shows.
     """
-    edges = np.flatnonzero(np.diff(np.diff(signal) != 0.0, prepend=False, append=False))
-    first, last = edges[::2], edges[1::2]
+    first, last = stretches(np.diff(signal) != 0.0).T
     passed_in = 4  # samples in which a count is passed
     ways = np.abs(signal[last] - signal[first])[last - first <= passed_in]
     ways = ways[ways > 0.0]

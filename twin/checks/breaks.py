@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from twin.checks.axis import Axis
 from twin.checks.explain import UNUSUAL, contradicted
 from twin.checks.report import Fault, Finding
-from twin.signals import Array
+from twin.signals import Array, stretches
 
-CLUSTER = 3  # samples between two bends of one break
+CLUSTER = 3  # samples between two jumps of one break
 ALIKE_SPEEDS = 0.3  # difference of two speeds, as a part of the larger
 SHORT_GAP = 0.05  # s, over which the speed may change, and which makes two breaks one
 CUT = "cut the log there (was an end stop hit, the carriage touched?)"
@@ -42,14 +42,14 @@ def check_breaks(axis: Axis) -> Iterator[Finding]:
     if count := axis.position_held:
         yield held(axis, "the position", count)
         return
-    if len(bends := uneven_bends(axis)):
-        size = f"{axis.jumps[bends - 1].max():.3g} {axis.log.units['position']}"
+    if len(curved := uneven_curvature(axis)):
+        size = f"{axis.jumps[curved - 1].max():.3g} {axis.log.units['position']}"
         yield axis.warning(
             Fault.UNEVEN,
-            f"the position bends by up to {size} at {len(bends)} samples all over the log: the "
+            f"the position bends by up to {size} at {len(curved)} samples all over the log: the "
             "clock jitters, or samples are missing",
             "record with the drive's own clock, or import with the time stamps",
-            f"from {(bends[0] - 1) / axis.sample_rate:.6g} s",
+            f"from {(curved[0] - 1) / axis.sample_rate:.6g} s",
         )
         return
     breaks = find_breaks(axis)
@@ -59,23 +59,22 @@ def check_breaks(axis: Axis) -> Iterator[Finding]:
 
 def find_breaks(axis: Axis) -> list[Break]:
     """All breaks in the order of time; none where the position is held for some samples each."""
-    bends = axis.bends
-    if not len(bends) or axis.position_held:
+    if not len(axis.curved_at) or axis.position_held:
         return []
     stuck = list(_stuck(axis))
-    bends = _outside(stuck, bends)
-    if not len(bends):
+    curved = _outside(stuck, axis.curved_at)
+    if not len(curved):
         return stuck
-    clusters = np.split(bends, np.flatnonzero(np.diff(bends) > CLUSTER) + 1)
+    clusters = np.split(curved, np.flatnonzero(np.diff(curved) > CLUSTER) + 1)
     single = [_classified(axis, int(c[0]), int(c[-1])) for c in clusters]
     return _undone(sorted([*stuck, *(b for b in single if b)], key=lambda b: b.first), axis)
 
 
-def _outside(breaks: Iterable[Break], bends: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The bends that none of these breaks is about."""
+def _outside(breaks: Iterable[Break], samples: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The samples that none of these breaks is about."""
     for b in breaks:
-        bends = bends[(bends < b.first - 2) | (bends > b.last + 2)]
-    return bends
+        samples = samples[(samples < b.first - 2) | (samples > b.last + 2)]
+    return samples
 
 
 def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
@@ -96,21 +95,19 @@ def _undone(breaks: list[Break], axis: Axis) -> list[Break]:
 
 
 def _stuck(axis: Axis) -> Iterator[Break]:
-    """One value for long, with a bend where it begins and where it ends."""
+    """One value for long, with a jump where it begins and where it ends."""
     x = axis.log.position
-    same = np.flatnonzero(np.diff(np.concatenate([[1.0], np.diff(x), [1.0]]) == 0.0))
     # s of one value; five samples at least, where so long is fewer
     least = max(5e-3 * axis.sample_rate, 5)
-    bends = axis.jumps > 0.0
-    for first, last in zip(same[::2], same[1::2], strict=False):
-        at_ends = all(bends[max(end - 3, 0) : end + 1].any() for end in (first, last))
+    for first, last in stretches(np.diff(x) == 0.0):
+        at_ends = all(axis.jumps[max(end - 3, 0) : end + 1].any() for end in (first, last))
         if last - first >= least and at_ends:
             caught_up = abs(x[min(last + 1, len(x) - 1)] - x[last])
             yield Break(Fault.STUCK, int(first), int(last), float(caught_up))
 
 
 def _classified(axis: Axis, first: int, last: int) -> Break | None:
-    """What the bends at samples ``first`` to ``last`` are; None where it cannot be told."""
+    """What jumps at samples ``first`` to ``last`` are; None where it cannot be told."""
     x, dt = axis.log.position, 1.0 / axis.sample_rate
     course = _around(x, first, last)
     if course is None:
@@ -119,7 +116,7 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
     speed = 0.5 * (before + after) / dt
     larger = max(abs(before), abs(after))
     alike = abs(before - after) <= ALIKE_SPEEDS * larger + axis.possible_jump
-    if abs(step) <= 6.0 * axis.possible_jump:  # times the bend that motion allows
+    if abs(step) <= 6.0 * axis.possible_jump:  # times the jump that motion allows
         if last - first > CLUSTER:
             return None
         off = float(axis.jumps[first - 1 : last].max())
@@ -185,16 +182,16 @@ def and_more(count: int) -> str:
     return f" and {count - 1} more times" if count > 1 else ""
 
 
-def uneven_bends(axis: Axis) -> NDArray[np.intp]:
-    """Samples where the position bends, if it does everywhere: by the clock, and by no wrap."""
-    bends = axis.bends
-    if not len(bends) or axis.position_held:
-        return bends[:0]
-    bends = bends[axis.jumps[bends - 1] < 0.5 * float(np.ptp(axis.log.position))]
-    places = 1 + np.count_nonzero(np.diff(bends) > SHORT_GAP * axis.sample_rate)
-    # a bend a second at least, and so many that it is not this and that, but the clock
+def uneven_curvature(axis: Axis) -> NDArray[np.intp]:
+    """Samples where the position jumps, if it does everywhere: by the clock, and by no wrap."""
+    curved = axis.curved_at
+    if not len(curved) or axis.position_held:
+        return curved[:0]
+    curved = curved[axis.jumps[curved - 1] < 0.5 * float(np.ptp(axis.log.position))]
+    places = 1 + np.count_nonzero(np.diff(curved) > SHORT_GAP * axis.sample_rate)
+    # a jump a second at least, and so many that it is not this and that, but the clock
     everywhere = places >= max(12, axis.duration)
-    return bends if everywhere else bends[:0]
+    return curved if everywhere else curved[:0]
 
 
 def held(axis: Axis, name: str, count: int) -> Finding:
@@ -207,8 +204,8 @@ def held(axis: Axis, name: str, count: int) -> Finding:
 
 def check_outliers(axis: Axis) -> Iterator[Finding]:
     """Outliers in position and command."""
-    unexplained = not axis.position_held and not len(uneven_bends(axis))
-    jumps = _outside(find_breaks(axis), axis.bends)
+    unexplained = not axis.position_held and not len(uneven_curvature(axis))
+    jumps = _outside(find_breaks(axis), axis.curved_at)
     if unexplained and len(jumps):
         unit = axis.log.units["position"]
         yield _outliers(

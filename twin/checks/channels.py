@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -109,22 +108,6 @@ _SLIPS: Mapping[float, str] = {
 }
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """A signal and the one that states the same, their ratio within ``allowed``.
-
-    follows: whether the other is a setpoint. zero: whether 0 is the same on both sides.
-    """
-
-    name: str
-    signal: Array
-    other_name: str
-    other: Array
-    allowed: tuple[float, float]
-    follows: bool = False
-    zero: bool = False
-
-
 def check_units(axis: Axis) -> Iterator[Finding]:
     """Unit slips and reversed signs."""
     for name in ("position", "setpoint_position"):
@@ -139,8 +122,7 @@ def check_units(axis: Axis) -> Iterator[Finding]:
             )
     if not axis.moves:
         return
-    for pair in _pairs(axis):
-        yield from _compare(axis, pair)
+    yield from _ratios(axis)
     fit, units = axis.dynamics, axis.log.kind
     if fit.explains and fit.mass_matters and fit.mass < 0.0:
         yield axis.error(
@@ -151,54 +133,62 @@ def check_units(axis: Axis) -> Iterator[Finding]:
         )
 
 
-def _pairs(axis: Axis) -> Iterator[_Pair]:
+def _ratios(axis: Axis) -> Iterator[Finding]:
+    """Signals that state the same in two sizes."""
     columns, smoother = axis.log.columns, axis.smoother
     setpoint = columns.get("setpoint_position")
     rates = {"velocity": ("position", axis.velocity)}
     if setpoint is not None:
         goal = smoother.position(setpoint)
         # allowed ratios, from and to: off by more, no controller follows at all
-        yield _Pair("position", smoother.position(columns["position"]), "setpoint_position", goal,
-                    (0.5, 2.0), follows=True)  # fmt: skip
+        yield from _compare(axis, "position", smoother.position(columns["position"]),
+                            "setpoint_position", goal, (0.5, 2.0), follows=True)  # fmt: skip
         rates["setpoint_velocity"] = ("setpoint_position", smoother.velocity(setpoint))
     for name, (of, rate) in rates.items():
         if name in columns:
             # a velocity and the rate of a position, which the low-pass rounds alike
             same_rate = (0.95, 1.05)
-            yield _Pair(name, smoother.rate(columns[name]), f"the rate of {of}", rate,
-                        same_rate, zero=True)  # fmt: skip
+            yield from _compare(axis, name, smoother.rate(columns[name]), f"the rate of {of}", rate,
+                                same_rate, zero=True)  # fmt: skip
     if setpoint is not None and "setpoint_acceleration" in columns:
         name = "setpoint_acceleration"
         same_second_rate = (0.9, 1.1)  # an acceleration and the second rate, whose noise is larger
-        yield _Pair(name, smoother.rate(columns[name]), "the second rate of setpoint_position",
-                    smoother.acceleration(setpoint), same_second_rate)  # fmt: skip
+        yield from _compare(axis, name, smoother.rate(columns[name]),
+                            "the second rate of setpoint_position", smoother.acceleration(setpoint),
+                            same_second_rate)  # fmt: skip
     if {"force", "current"} <= set(columns) and axis.log.force_constant is not None:
         same_force = (0.98, 1.02)  # a force and its current: one scale, with no filter between
-        yield _Pair("force", columns["force"], "force constant x current",
-                    axis.log.force_constant * columns["current"], same_force)  # fmt: skip
+        yield from _compare(axis, "force", columns["force"], "force constant x current",
+                            axis.log.force_constant * columns["current"], same_force)  # fmt: skip
 
 
-def _compare(axis: Axis, pair: _Pair) -> Iterator[Finding]:
-    one, other = pair.signal, pair.other
-    if not pair.zero:
+def _compare(
+    axis: Axis, name: str, one: Array, other_name: str, other: Array,
+    allowed: tuple[float, float], *, follows: bool = False, zero: bool = False,
+) -> Iterator[Finding]:  # fmt: skip
+    """Of a signal and the one that states the same, their ratio where it is not within ``allowed``.
+
+    follows: whether the other is a setpoint. zero: whether 0 is the same on both sides.
+    """
+    if not zero:
         one, other = one - one.mean(), other - other.mean()
     power, product = float(other @ other), float(one @ other)
     related = 0.9  # correlation of two signals that state the same
     if power == 0.0 or abs(product) < related * np.sqrt(power * float(one @ one)):
         return
     ratio = product / power
-    if pair.allowed[0] <= ratio <= pair.allowed[1]:
+    if allowed[0] <= ratio <= allowed[1]:
         return
     wrong = "one of them is reversed"
     if ratio > 0.0:
         off = abs(np.log(ratio))
         looks_like = 0.3  # of the logarithm: how near to a known slip of units a ratio is named so
         near = [text for s, text in _SLIPS.items() if abs(off - np.log(s)) < looks_like]
-        if not near and pair.follows and axis.soft_loop:
+        if not near and follows and axis.soft_loop:
             return
         wrong = f"it looks like {near[0]}" if near else "a scale or the sample rate is wrong"
     fault = Fault.SIGN if ratio < 0.0 else Fault.UNIT
-    what = f"{pair.name} is {ratio:.4g} times {pair.other_name}: {wrong}"
+    what = f"{name} is {ratio:.4g} times {other_name}: {wrong}"
     yield axis.error(fault, what, "correct unit, scale, sign or sample rate in the import map")
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from twin.checks.axis import READINGS, Axis, held_samples
 from twin.checks.breaks import and_more, held
 from twin.checks.report import WHOLE, Fault, Finding, Severity
-from twin.signals import Array
+from twin.signals import Array, stretches
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
 # Whoever knows it to be right takes the word away.
@@ -265,5 +265,5 @@ def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:
 
 def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Starts and lengths of the intervals of True."""
-    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
-    return edges[::2], edges[1::2] - edges[::2]
+    starts, stops = stretches(mask).T
+    return starts, stops - starts

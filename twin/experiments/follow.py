@@ -27,7 +27,7 @@ from twin.logs.writer import software_version
 from twin.model.file import format_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array, rate
-from twin.simulator import MujocoSimulator, Progress, ReducedSimulator, Run, run_parts
+from twin.simulator import MujocoSimulator, Progress, Run, Simulator, run_parts
 
 
 def follow_parts(
@@ -37,7 +37,7 @@ def follow_parts(
     *,
     name: str,
     seed: int,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     controllers: Mapping[str, Controller] | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Log]:
@@ -150,7 +150,7 @@ def replay(
     setpoint: Setpoint | None = None,
     controllers: Mapping[str, Controller] | None = None,
     seed: int = 0,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     progress: Progress | None = None,
 ) -> Log:
     """The log of the twin that follows the reference of another log, at that log's sample rate.

@@ -36,7 +36,7 @@ from twin.logs import Log
 from twin.logs.log import joined
 from twin.model.machine import MachineModel
 from twin.numbers import neat, require_seed
-from twin.simulator import MujocoSimulator, Progress, ReducedSimulator
+from twin.simulator import MujocoSimulator, Progress, Simulator
 
 MAP_SPEEDS = (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02, 0.04, 0.08)  # m/s
 DURATION = 20.0  # s
@@ -119,10 +119,6 @@ def _limit(model: MachineModel, axis: str) -> Limits:
     return machine_limits(model)[list(model.axes).index(axis)]
 
 
-def _moves(model: MachineModel, axis: str, duration: float) -> Experiment:
-    return Moves(count=max(int(duration / 0.1), 2), duration=duration)  # s between moves
-
-
 def _cable_pass(model: MachineModel, axis: str, duration: float) -> Experiment:
     limit = _limit(model, axis)
     low, high = limit.travel
@@ -140,10 +136,6 @@ def _velocity_map(model: MachineModel, axis: str, duration: float) -> Experiment
     return lasting(draft, model, duration)
 
 
-def _reversals(model: MachineModel, axis: str, duration: float) -> Experiment:
-    return lasting(Reversals(axis, repeats=1), model, duration)
-
-
 def _multisine(model: MachineModel, axis: str, duration: float) -> Experiment:
     """Four periods, between one in which it begins and one in which it ends."""
     limit, period = _limit(model, axis), duration / 6.0
@@ -158,10 +150,16 @@ def _multisine(model: MachineModel, axis: str, duration: float) -> Experiment:
 
 EXPERIMENTS: Mapping[str, Named] = {
     "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration)),
-    "moves": Named(Moves.summary, _moves),
+    "moves": Named(
+        Moves.summary,
+        lambda model, axis, duration: Moves(max(int(duration / 0.1), 2), duration=duration),
+    ),  # s between moves
     "cable_pass": Named("one axis back and forth at 0.1 m/s over the travel", _cable_pass),
     "velocity_map": Named(Staircase.summary, _velocity_map),
-    "reversals": Named("one axis 4 um back and forth", _reversals),
+    "reversals": Named(
+        "one axis 4 um back and forth",
+        lambda model, axis, duration: lasting(Reversals(axis, repeats=1), model, duration),
+    ),
     "open_loop_sine": Named(
         "sinusoidal force of 0.21 N and 3 s on one axis, no feedback",
         lambda model, axis, duration: OpenLoopSine(axis, duration),
@@ -196,7 +194,7 @@ def simulate(
     seed: int = 0,
     duration: float | None = None,
     axis: str | None = None,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     progress: Progress | None = None,
 ) -> Log:
     """Run an experiment on the twin and return its log, with the truth topics.
@@ -221,7 +219,7 @@ def simulate_parts(
     seed: int = 0,
     duration: float | None = None,
     axis: str | None = None,
-    simulator: type[MujocoSimulator] | type[ReducedSimulator] = MujocoSimulator,
+    simulator: Simulator = MujocoSimulator,
     progress: Progress | None = None,
 ) -> Iterator[Log]:
     """``simulate`` in parts of two seconds or so, to be recorded while the twin runs."""

@@ -60,17 +60,35 @@ class Loss:
 
 
 @dataclass(frozen=True)
+class Held:
+    """What a format holds of one axis as the model does, what nearly, and what not at all."""
+
+    kept: tuple[str, ...]
+    approximated: tuple[Remark, ...]
+    lost: tuple[Remark, ...]
+
+
+@dataclass(frozen=True)
 class Exported:
-    """The files of an export, and what they lack of the model."""
+    """The files of an export by name, and what they hold of each axis."""
 
     files: Mapping[str, str | bytes]
-    """Content by file name."""
-    kept: Mapping[str, tuple[str, ...]]
-    """By axis, what the files hold as the model does."""
-    approximated: tuple[Remark, ...] = ()
-    """What they hold nearly."""
-    lost: tuple[Remark, ...] = ()
-    """What they do not hold."""
+    axes: Mapping[str, Held]
+
+    @property
+    def kept(self) -> dict[str, tuple[str, ...]]:
+        """By axis, what the files hold as the model does."""
+        return {name: own.kept for name, own in self.axes.items()}
+
+    @property
+    def approximated(self) -> tuple[Remark, ...]:
+        """What they hold nearly."""
+        return tuple(remark for own in self.axes.values() for remark in own.approximated)
+
+    @property
+    def lost(self) -> tuple[Remark, ...]:
+        """What they do not hold."""
+        return tuple(remark for own in self.axes.values() for remark in own.lost)
 
 
 Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]

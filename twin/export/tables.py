@@ -17,7 +17,7 @@ from twin.errors import InputError
 from twin.experiments.follow import recorded_setpoint
 from twin.experiments.named import find_experiment
 from twin.experiments.trajectory import AnySetpoint
-from twin.export import Exported, Loss, Remark
+from twin.export import Exported, Held, Loss, Remark, axis_identifiers
 from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -187,13 +187,10 @@ def fewest_points(speeds: Array, force: Array, count: int) -> tuple[Array, float
 
 
 @dataclass(frozen=True)
-class Judged:
+class Judged(Held):
     """The tables of one axis, and what becomes of its effects in them."""
 
     tables: AxisTables
-    kept: tuple[str, ...]
-    approximated: tuple[Remark, ...]
-    lost: tuple[Remark, ...]
 
 
 Made = Callable[[AxisTables], AxisTables]
@@ -206,14 +203,15 @@ def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dic
     return {name: _judged(model, name, given, made) for name in model.axes}
 
 
-def exported(files: Mapping[str, str | bytes], found: Mapping[str, Judged]) -> Exported:
-    """Files that were made of the tables."""
-    return Exported(
-        files,
-        {name: own.kept for name, own in found.items()},
-        tuple(r for own in found.values() for r in own.approximated),
-        tuple(r for own in found.values() for r in own.lost),
-    )
+def exported(
+    model: MachineModel,
+    found: Mapping[str, Judged],
+    files_of: Callable[[str, AxisModel, Judged], Mapping[str, str]],
+) -> Exported:
+    """The files of each axis, made of its name as one of a program, itself and its tables."""
+    names = axis_identifiers(model)
+    made = (files_of(names[name], axis, found[name]) for name, axis in model.axes.items())
+    return Exported({file: text for files in made for file, text in files.items()}, found)
 
 
 def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> Judged:
@@ -256,4 +254,4 @@ def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> 
         else:
             text = (found.lost if lost else found.approximated)[effect]
         remarks[lost].append(Remark(name, effect, text))
-    return Judged(whole, tuple(kept), tuple(remarks[False]), tuple(remarks[True]))
+    return Judged(tuple(kept), tuple(remarks[False]), tuple(remarks[True]), whole)

@@ -261,10 +261,10 @@ def guess_map(path: Path) -> Guess:
             raise InputError("has no column of numbers; give another file")
     counters = [n for n, c in columns.items() if _counts(n, c)]
     time = _time({n: c for n, c in columns.items() if n not in counters})
-    clock, step = _clock(columns, time, counters, table.sample_rate)
+    time_base, step = _time_base(columns, time, counters, table.sample_rate)
     moving = {n: c for n, c in columns.items() if n not in (time, *counters) and np.ptp(c) > 0.0}
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
-    lines, used = [head, *clock], {time}
+    lines, used = [head, *time_base], {time}
     missing = [holes[time]] if time in holes else []
     for axis, names in _axes(moving).items():
         found = signals_of(names, moving, step)
@@ -357,10 +357,10 @@ def _time(columns: Columns) -> str | None:
     return next(iter([*called, *even]), None)
 
 
-def _clock(
+def _time_base(
     columns: Columns, time: str | None, counters: Sequence[str], stated: float | None
 ) -> tuple[list[str], float]:
-    """The lines of the clock, and the step in s."""
+    """The lines of the time base, and the step in s."""
     if stated is not None:
         return [f"# the file states its sample rate: {stated:g} Hz"], 1.0 / stated
     if time is None:

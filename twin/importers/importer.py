@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from twin.errors import InputError, at
 from twin.importers import csv_text
@@ -29,126 +28,11 @@ from twin.importers.formats import (
 )
 from twin.importers.mapping import ImportMap
 from twin.importers.table import Table, numbers
+from twin.importers.time_base import TimeBase, even_times, rate_of, time_base_of
 from twin.logs.container import reading
 from twin.logs.log import HELD, Array, AxisLog, Log
 from twin.logs.topics import instant, is_calendar
-from twin.numbers import first_not_finite, independent
-
-
-def rate_of(time: Array) -> float:
-    """Sample rate in Hz of times (n,) in s.
-
-    It is the nearest whole number where the times allow that. Raises InputError that names row and
-    time where they do not increase, have a gap, or are off the even grid by more than 1 %.
-    """
-    jitter = 0.01  # of a period: how far a time may be off the even grid
-    _require_finite(time)
-    elapsed = time - time[0]
-    steps = np.diff(elapsed)
-    period = float(np.median(steps))
-    rate = len(steps) / max(float(elapsed[-1]), 1e-9)  # less than none is refused below
-    if abs(round(rate) / rate - 1.0) * len(steps) < jitter:
-        rate = float(round(rate))
-    off = np.abs(elapsed * rate - np.arange(len(time)))
-    for fault, wrong in (
-        ("does not increase", np.append(False, steps <= 0.0)),
-        ("has a gap", np.append(False, steps > 1.5 * period)),
-        (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > jitter),
-    ):
-        if wrong.any():
-            _require_no_hole(time)  # which a clock would not mend
-            row = int(np.argmax(wrong))
-            raise InputError(
-                f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
-                f"in row {row + 1}, usual are {period:.6g} s a sample; give resample = "
-                f"{1.0 / max(period, 1e-9):.6g} (Hz) in the map, or sample_rate in place of time "
-                "where only the printed times are inexact"
-            )
-    return rate
-
-
-def _require_finite(time: Array) -> None:
-    if (k := first_not_finite(time)) is not None:
-        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
-
-
-def _require_no_hole(time: Array) -> None:
-    steps = np.diff(time)
-    gap = int(np.argmax(steps))
-    longest_gap = 20.0  # usual steps, over which a line is no measurement
-    if steps[gap] > longest_gap * float(np.median(steps)) > 0.0:
-        raise InputError(
-            f"there is nothing between {instant(time[gap])} and {instant(time[gap + 1])}; import "
-            "the parts before and behind it as logs of their own"
-        )
-
-
-def even_times(begin: float, end: float, rate: float) -> Array:
-    """Times in s from ``begin`` to ``end``, of which there are ``rate`` a second."""
-    return begin + np.arange(int((end - begin) * rate * (1.0 + 1e-12)) + 1) / rate
-
-
-@dataclass(frozen=True)
-class Clock:
-    """rows: those kept, in the order of time; times: (n,) s of them; grid: (m,) s, even."""
-
-    rows: NDArray[np.intp]
-    times: Array
-    grid: Array
-    dropped: int
-
-    def resampled(self, column: Array) -> Array:
-        """A column (rows of the file,) on the even clock, by straight lines."""
-        return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
-
-    @property
-    def leaves_all(self) -> bool:
-        """Whether the even clock has every row that it spans where it was."""
-        places = np.interp(self.grid, self.times, np.arange(float(len(self.times))))
-        near = 1e-6  # of a step, that a time in s has lost by rounding
-        each = np.rint(places[:1]) + np.arange(len(places))  # row after row
-        return not self.dropped and bool(np.all(np.abs(places - each) < near))
-
-    def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
-        """What was resampled, and the RMS error of the straight lines in each signal of a map."""
-        steps, each = np.diff(self.times) * 1e3, []
-        for axis, entry in mapping.axes.items():
-            for field, c in entry.columns.items():
-                kept = columns[c.name][self.rows]
-                between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
-                # Of a smooth signal lines twice as long are four times as far off.
-                rms = float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
-                size = c.si.size * abs(float(c.scale)) * rms
-                each.append(f"{axis}.{field} {size:.2g} {entry.units[field]}")
-        rows = "row" if self.dropped == 1 else "rows"
-        dropped = f", {self.dropped} {rows} with a time that does not increase left out"
-        spread = " to ".join(dict.fromkeys(f"{step:.3g}" for step in (steps.min(), steps.max())))
-        return (
-            f"steps of {spread} ms were resampled to "
-            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}; "
-            f"error rms about {', '.join(each)}"
-        )
-
-
-def clock_of(time: Array, rate: float) -> Clock:
-    """The even clock of ``rate`` Hz over the times (n,) in s; raises InputError."""
-    _require_finite(time)
-    increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
-    rows = np.flatnonzero(increasing)
-    kept = time[rows]
-    if len(kept) < 3 or 2 * len(kept) < len(time):
-        raise InputError(f"the time increases in {len(kept)} of {len(time)} rows only")
-    steps = np.diff(kept)
-    usual = float(np.median(steps))
-    if rate * usual > 2.0 or rate * usual < 0.01:
-        raise InputError(
-            f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
-        )
-    _require_no_hole(kept)
-    return Clock(rows, kept, even_times(kept[0], kept[-1], rate), len(time) - len(kept))
-
-
-# --- a log of a table -----------------------------------------------------------------------------
+from twin.numbers import independent
 
 Columns = Mapping[str, Array]
 Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint -> ratio
@@ -186,10 +70,10 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
         if mapping.resample is None or mapping.time is None:
             return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
         with at(f"column '{mapping.time.name}'"):
-            clock = clock_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
-        even = {n: clock.resampled(c) for n, c in columns.items() if n != mapping.time.name}
-        if not clock.leaves_all:
-            facts["resampled"] = clock.costs(mapping, columns)
+            base = time_base_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
+        even = {n: base.resampled(c) for n, c in columns.items() if n != mapping.time.name}
+        if not base.leaves_all:
+            facts["resampled"] = base.costs(mapping, columns)
         return _log(mapping, even, mapping.resample, facts)
 
 
@@ -202,7 +86,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
             "give one for each, in the same order"
         )
     assert rate is not None
-    clocks: list[tuple[ImportMap, Columns, Clock]] = []
+    bases: list[tuple[ImportMap, Columns, TimeBase]] = []
     facts: dict[str, str] = {}
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
@@ -210,18 +94,18 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
             table, columns, of_file, scalars = _read(path, own)
             own, mapping = (m.scaled_by(scalars, number) for m in (own, mapping))
             times = _times(table, own, columns) + files[number - 1].offset
-            clocks.append((own, columns, clock_of(times, rate)))
+            bases.append((own, columns, time_base_of(times, rate)))
         facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
-    begin = max(clock.times[0] for _, _, clock in clocks)
-    end = min(clock.times[-1] for _, _, clock in clocks)
+    begin = max(base.times[0] for _, _, base in bases)
+    end = min(base.times[-1] for _, _, base in bases)
     if not (end - begin) * rate >= 2.0:
-        ends = ((instant(clock.times[0]), instant(clock.times[-1])) for _, _, clock in clocks)
+        ends = ((instant(base.times[0]), instant(base.times[-1])) for _, _, base in bases)
         spans = "; ".join(f"{p} {a} to {b}" for p, (a, b) in zip(paths, ends, strict=True))
         raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
     grid = even_times(begin, end, rate)
     even: dict[str, Array] = {}
-    for number, (own, columns, clock) in enumerate(clocks, 1):
-        shared = replace(clock, grid=grid)
+    for number, (own, columns, base) in enumerate(bases, 1):
+        shared = replace(base, grid=grid)
         if not shared.leaves_all:
             facts[f"resampled_{number}"] = shared.costs(own, columns)
         even |= {c.key: shared.resampled(columns[c.name]) for c in own.columns()}

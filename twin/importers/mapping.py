@@ -147,11 +147,6 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def field_unit(field: str, text: str) -> Unit:
-    """The unit of a log field, of a linear or a rotary axis; raises InputError."""
-    return find_unit(text, *dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field])))
-
-
 # --- the map --------------------------------------------------------------------------------------
 
 NUMBER = "a finite number"
@@ -212,7 +207,8 @@ class ColumnMap(_Column):
 
     def require_unit(self, field: str) -> None:
         """Find the unit, of a signal of that name; raises InputError where there is none."""
-        self._si = field_unit(field, self.unit)
+        either = dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field]))
+        self._si = find_unit(self.unit, *either)
         if self.si.si is None and "scale" not in self.model_fields_set:
             raise InputError(f"unit '{self.unit}' needs a scale: how much one of it is in SI")
         if self.scale == 0.0:
@@ -367,7 +363,7 @@ class ImportMap(_File):
         if self.time is not None and self.sample_rate is not None:
             raise InputError("sample_rate and time are both given; give one of them")
         if self.files is not None:
-            self._require_clocks(self.files)
+            self._require_time_bases(self.files)
         elif self.resample is not None and self.time is None:
             raise InputError('resample needs the times; give time = {column = "t", unit = "s"} too')
         for name, axis in self.axes.items():
@@ -380,7 +376,7 @@ class ImportMap(_File):
         if most > max(count, 1):
             raise InputError(f"file = {most}: the map has {count} [[files]] tables; add one")
 
-    def _require_clocks(self, files: list[FileMap]) -> None:
+    def _require_time_bases(self, files: list[FileMap]) -> None:
         if self.time is not None or self.sample_rate is not None:
             raise InputError(
                 "time and sample_rate are those of each file; give them under [[files]]"

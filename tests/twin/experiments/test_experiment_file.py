@@ -2,11 +2,11 @@
 
 import re
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
 from cli_runs import twin
+from import_cases import csv_columns
 
 from identify.cli.shared import app
 from twin.effects import load_catalogue
@@ -111,18 +111,13 @@ def test_bad_input_of_the_commands_is_refused(arguments, said, tmp_path, monkeyp
     assert [f.name for f in tmp_path.iterdir()] == ["next.toml"], "something was written"
 
 
-def read(path: Path) -> dict[str, np.ndarray]:
-    head, *rows = path.read_text().splitlines()
-    return dict(zip(head.split(","), np.loadtxt(rows, delimiter=",").T, strict=True))
-
-
 @pytest.mark.parametrize(
     ("experiment", "seed"), [(Moves(40, duration=1.0), 3), (Passes("y", 0.02, 0.05, 1), 0)]
 )
 def test_the_table_is_the_setpoint_of_the_simulation_of_that_seed(experiment, seed, tmp_path):
     write_setpoints(experiment, PROTON, seed, tmp_path / "s.csv")
     log = simulate(PROTON, experiment, seed=seed)
-    table = read(tmp_path / "s.csv")
+    table = csv_columns((tmp_path / "s.csv").read_text())
     assert list(table) == ["time [s]"] + [
         f"{axis} {name}"
         for axis in ("x", "y")
@@ -140,7 +135,7 @@ def test_a_trajectory_of_ros_2_has_the_points_of_the_table(tmp_path):
     experiment = Moves(2, duration=1.003)
     for ending in ("csv", "yaml"):
         write_setpoints(experiment, PROTON, 3, tmp_path / f"s.{ending}")
-    table, text = read(tmp_path / "s.csv"), (tmp_path / "s.yaml").read_text()
+    table, text = csv_columns((tmp_path / "s.csv").read_text()), (tmp_path / "s.yaml").read_text()
     joints, key, *points = text.splitlines()
     assert (joints, key) == ("joint_names: [x, y]", "points:")
     times = re.findall(r"{sec: (\d+), nanosec: (\d+)}", text)
@@ -158,7 +153,7 @@ def test_a_trajectory_of_ros_2_has_the_points_of_the_table(tmp_path):
 def test_structured_text_has_a_point_of_the_table_for_each_cycle(tmp_path):
     for ending in ("csv", "st"):
         write_setpoints(Moves(2, duration=1.003), PROTON, 3, tmp_path / f"s.{ending}")
-    table, text = read(tmp_path / "s.csv"), (tmp_path / "s.st").read_text()
+    table, text = csv_columns((tmp_path / "s.csv").read_text()), (tmp_path / "s.st").read_text()
     arrays = re.findall(r"(\w+) : ARRAY\[0\.\.(\d+)\] OF \w+ := \[ \(\* (.+) \*\)([^\]]+)\];", text)
     found = {f"{name} [{unit}]": np.array(rows.split(","), float) for name, _, unit, rows in arrays}
     last = int(re.search(r"Last : DINT := (\d+);", text)[1])
@@ -182,7 +177,7 @@ def test_other_files_of_setpoints_are_refused(tmp_path):
 
 def test_a_force_has_a_column_of_its_own(tmp_path):
     write_setpoints(OpenLoopSine("x", 3.0), PROTON, 0, tmp_path / "s.csv")
-    table = read(tmp_path / "s.csv")
+    table = csv_columns((tmp_path / "s.csv").read_text())
     assert np.abs(table["x force [N]"]).max() == pytest.approx(0.21)
     assert "y force [N]" not in table
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from axis_runs import effect as fitted
 from cli_runs import refusal, twin
+from import_cases import csv_columns
 from strict_json import valid
 
 from identify.testing import assert_exported
@@ -43,14 +44,6 @@ def slide(*effects: Fitted) -> MachineModel:
     return MachineModel("slide", {"x": AxisModel(3.0, HARDWARE, effects)}, 1000.0)
 
 
-def table(text: str | bytes) -> dict[str, np.ndarray]:
-    """Columns of a CSV file by name."""
-    assert isinstance(text, str)
-    head, *rows = text.splitlines()
-    columns = np.array([[float(v) for v in row.split(",")] for row in rows]).T
-    return dict(zip(head.split(","), columns, strict=True))
-
-
 def test_the_sum_of_the_tables_is_the_force_of_the_model() -> None:
     model = slide(*PLAIN)
     made = find_exporter("csv").export(model, {})
@@ -59,7 +52,7 @@ def test_the_sum_of_the_tables_is_the_force_of_the_model() -> None:
     assert not made.lost
     (motion,) = motions(model, {})
     x, v, a = own = motion.setpoints["x"]
-    files = {name: table(text) for name, text in made.files.items()}
+    files = {name: csv_columns(text) for name, text in made.files.items()}
     (mass,) = files["x_mass.csv"]["mass (kg)"]
     assert mass == pytest.approx(3.3)
     place, along = files["x_position.csv"].values()
@@ -71,7 +64,7 @@ def test_the_sum_of_the_tables_is_the_force_of_the_model() -> None:
     found += np.where(v < 0, np.interp(-v, speed, backwards), 0.0)
     wanted = feedforward(model.axes["x"], own, np.zeros_like(own), motion.period)
     assert np.abs(found - wanted)[v != 0.0].max() < 2e-3 * np.abs(wanted).max()
-    terms = table(made.files["x_cogging_harmonics.csv"])
+    terms = csv_columns(made.files["x_cogging_harmonics.csv"])
     waves = 2.0 * np.pi * np.outer(phase, 1.0 / terms["period (m)"])
     again = np.sin(waves) @ terms["sine (N)"] + np.cos(waves) @ terms["cosine (N)"]
     np.testing.assert_allclose(again, force, atol=1e-8)
@@ -99,8 +92,8 @@ def test_twincat_has_twenty_points_and_says_in_newtons_what_it_has_no_place_for(
     assert {"mass", "cogging", "payload_mass"} == set(made.kept["x"])
     # what the other two make of the friction is lost of it, too
     assert "coulomb_viscous" in {r.part for r in made.approximated}
-    assert len(table(made.files["x_cogging.csv"])["current (A)"]) == 256
-    assert table(made.files["x_cogging.csv"])["current (A)"][0] == pytest.approx(-0.1 / 20.0)
+    assert len(csv_columns(made.files["x_cogging.csv"])["current (A)"]) == 256
+    assert csv_columns(made.files["x_cogging.csv"])["current (A)"][0] == pytest.approx(-0.1 / 20.0)
 
 
 def test_the_points_that_lose_least_are_found() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from import_cases import MAP as PLAIN
-from import_cases import map_of, mapping
+from import_cases import map_of, mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log
@@ -128,9 +128,8 @@ def write_two(folder: Path) -> list[Path]:
     """A position with uneven times; a force that is sampled twice as fast from 1.5 s on."""
     steps = 1e-3 * (1.0 + 0.2 * np.random.default_rng(1).uniform(-1.0, 1.0, 4000))
     times, late = np.cumsum(steps), 1.5 + np.arange(3000) / 2000.0
-    for name, columns in (("a.csv", (times, np.sin(times))), ("b.csv", (late, np.cos(late)))):
-        rows = [f"{float(t)!r},{float(q)!r}" for t, q in zip(*columns, strict=True)]
-        (folder / name).write_text("\n".join(["t,q", *rows]) + "\n")
+    write_csv(folder / "a.csv", {"t": times, "q": np.sin(times)})
+    write_csv(folder / "b.csv", {"t": late, "q": np.cos(late)})
     return [folder / "a.csv", folder / "b.csv"]
 
 
@@ -150,7 +149,7 @@ def test_files_of_one_rate_need_no_clock(tmp_path):
     rng = np.random.default_rng(2)
     columns = rng.standard_normal((2, 50))
     for name, column in zip("ab", columns, strict=True):
-        (tmp_path / f"{name}.csv").write_text("\n".join(["q", *map(repr, column.tolist())]) + "\n")
+        write_csv(tmp_path / f"{name}.csv", {"q": column})
     rates = 2 * "[[files]]\nsample_rate = 500.0\n"
     both = mapping(tmp_path, rates + TWO[TWO.index("[axes.x]") :])
     log = import_log([tmp_path / "a.csv", tmp_path / "b.csv"], both)

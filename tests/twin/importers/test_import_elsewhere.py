@@ -11,7 +11,7 @@ from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Kind
 from google.protobuf.descriptor_pb2 import FileDescriptorProto
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
-from import_cases import map_of, mapping
+from import_cases import map_of, mapping, write_csv
 from mcap.opcode import Opcode
 from mcap_bytes import of
 
@@ -204,8 +204,7 @@ def test_times_since_1970_are_shown_as_dates(tmp_path):
     assert instant(EPOCH + 0.5) == "2023-11-14 22:13:20.5 UTC"
     t = EPOCH + T
     t[200:] += 0.5
-    rows = [f"{float(a)!r},{float(q)!r}" for a, q in zip(t, Q, strict=True)]
-    (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
+    write_csv(tmp_path / "a.csv", {"t": t, "q": Q})
     text = map_of("q", "q", clock="t in s")
     with pytest.raises(InputError, match=r"between 2023-11-14 22:13:20\.199 UTC and 2023"):
         imported(tmp_path, "a.csv", text)

@@ -7,9 +7,11 @@ seven columns of one axis and three of another whose every number differs.
 import hashlib
 import math
 import sys
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from struct import pack
 
 import numpy as np
 import pytest
@@ -30,10 +32,11 @@ from import_cases import (
     write_parquet,
     write_tdms,
 )
-from scipy.io import loadmat
+from scipy.io import loadmat, savemat
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
+from twin.importers.formats import content_bytes
 from twin.importers.table import numbers, require_columns, split_columns
 from twin.logs.log import FIELDS
 
@@ -268,12 +271,8 @@ def test_the_emps_drive_is_imported(shared_data: Path) -> None:
 @pytest.mark.parametrize("delay", [-23, -22, 22])
 def test_a_delay_may_leave_two_samples_and_no_fewer(tmp_path, delay):
     write_csv(tmp_path / "log.csv", {"q": np.arange(ROWS) + 1.0, "u": np.arange(ROWS) + 50.0})
-    text = f"""
-sample_rate = 100.0
-[axes.x]
-position = {{column = "q", unit = "m", delay_samples = {delay}}}
-force = {{column = "u", unit = "N"}}
-"""
+    text = map_of("q", "u", units=("m", "N"))
+    text = text.replace('"q"', f'"q", delay_samples = {delay}')
     left = ROWS - abs(delay)
     if left < 2:
         with pytest.raises(InputError, match=f"delay_samples of {min(0, delay)} to"):
@@ -321,11 +320,56 @@ def test_a_scale_may_be_a_scalar_of_the_file(tmp_path: Path) -> None:
     raw = np.sin(np.arange(50.0))
     file = tmp_path / "run.mat"
     write_mat(file, {"q": raw, "u": 2.0 * raw})  # and gain = 3
-    text = (
-        "sample_rate = 100.0\n[axes.x]\nposition = {column = 'q', unit = 'm'}\n"
-        "force = {column = 'u', unit = 'V', scale = 'gain'}\n"
-    )
+    text = map_of("q", "u", units=("m", "V")).replace('"u"', '"u", scale = "gain"')
     assert import_log(file, mapping(tmp_path, text)).axes["x"].force == pytest.approx(6.0 * raw)
     for name, said in (("q", "name a scalar"), ("gian", "no column 'gian'; did you mean 'gain'")):
         with pytest.raises(InputError, match=said):
             import_log(file, mapping(tmp_path, text.replace("gain", name)))
+
+
+def hdf5_bomb(path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file.create_dataset("q", (10**11,), "f8", chunks=(1 << 20,), compression="gzip")
+
+
+def parquet_bomb(path: Path) -> None:
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    column = pyarrow.nulls(20_000_000, pyarrow.float64())
+    parquet.write_table(pyarrow.table({"q": column}), path)
+
+
+def mat_bomb(path: Path) -> None:
+    size = 1 << 28
+    head = pack("<IIIIIIiiIIQII", 6, 8, 6, 0, 5, 8, 1, size // 8, 1, 1, ord("q"), 9, size)
+    deflate = zlib.compressobj(9)
+    data = deflate.compress(pack("<II", 14, len(head) + size) + head)
+    data += deflate.flush(zlib.Z_FULL_FLUSH)  # what follows does not refer to it: it may repeat
+    data += 256 * (deflate.compress(bytes(size >> 8)) + deflate.flush(zlib.Z_FULL_FLUSH))
+    path.write_bytes(
+        b"MATLAB 5.0 MAT-file".ljust(124) + pack("<HH", 0x0100, 0x4D49)
+        + pack("<II", 15, len(data)) + data
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("ending", "write"), [("h5", hdf5_bomb), ("parquet", parquet_bomb), ("mat", mat_bomb)]
+)
+def test_a_small_file_that_announces_a_large_table_is_one_line(tmp_path, ending, write):
+    path = tmp_path / f"a.{ending}"
+    write(path)
+    assert path.stat().st_size < 1 << 19
+    with pytest.raises(InputError, match="export it again"):
+        import_log(path, mapping(tmp_path, map_of("q", "q")))
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_memory_is_granted_for_what_a_mat_file_holds(tmp_path, compressed):
+    """As many bytes as its arrays have, beside names and sizes, however they are packed."""
+    path, arrays = tmp_path / "a.mat", {"q": np.zeros(300_000), "s": {"r": np.arange(70_000.0)}}
+    savemat(path, arrays, do_compression=compressed)
+    assert content_bytes(path) == pytest.approx(370_000 * 8, abs=1000)
+    savemat(path, {"q": np.zeros(1000)}, format="4")
+    assert content_bytes(path) == path.stat().st_size
+    path.write_bytes(path.read_bytes()[:50])
+    assert content_bytes(path) == 50

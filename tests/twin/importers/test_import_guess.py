@@ -33,35 +33,6 @@ def columns_of(folder: Path, text: str) -> dict[str, dict[str, str]]:
     }
 
 
-@pytest.mark.parametrize(
-    ("columns", "expected", "rate"),
-    [
-        ({"time [ms]": 1e3 * T, "pos [mm]": 1e3 * Q, "force [N]": F, "ref_pos [mm]": 1e3 * Q},
-         {"x": {"position": "pos [mm]", "force": "force [N]",
-                "setpoint_position": "ref_pos [mm]"}}, 1000.0),
-        ({"t": T, "qm": Q, "qg": Q + 1e-6 * NOISE, "vir": F, "temp": NOISE},
-         {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}, 1000.0),
-        ({"Time": 1.7e9 + T, "xPos_mm": 1e3 * Q, "yPos_mm": 1e3 * V, "xCurrent_A": F,
-          "yCurrent_A": NOISE},
-         {"x": {"position": "xPos_mm", "current": "xCurrent_A"},
-          "y": {"position": "yPos_mm", "current": "yCurrent_A"}}, 1000.0),
-        ({"one": T, "two": NOISE, "three": V, "four": Q, "five": F},
-         {"x": {"position": "four", "velocity": "three", "force": "five"}}, 1000.0),
-        ({"one": T, "two": F, "three": NOISE, "four": Q},
-         {"x": {"position": "four", "force": "two"}}, 1000.0),
-    ],
-)  # fmt: skip
-def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, rate):
-    write_csv(tmp_path / "a.csv", columns)
-    found = guess_map(tmp_path / "a.csv")
-    assert not found.missing
-    assert columns_of(tmp_path, found.text) == expected
-    assert "resample" not in found.text  # the steps are even
-    log = import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
-    assert log.sample_rate == rate
-    np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
-
-
 def trailing(column, samples=25):
     """A loop that is so many samples behind its setpoint, a little smaller, read with noise."""
     late = np.r_[np.full(samples, column[0]), column[:-samples]]
@@ -76,28 +47,47 @@ MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
 @pytest.mark.parametrize(
     ("columns", "expected", "told"),
     [
+        ({"time [ms]": 1e3 * T, "pos [mm]": 1e3 * Q, "force [N]": F, "ref_pos [mm]": 1e3 * Q},
+         {"x": {"position": "pos [mm]", "force": "force [N]",
+                "setpoint_position": "ref_pos [mm]"}}, ""),
+        ({"t": T, "qm": Q, "qg": Q + 1e-6 * NOISE, "vir": F, "temp": NOISE},
+         {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}, ""),
+        ({"Time": 1.7e9 + T, "xPos_mm": 1e3 * Q, "yPos_mm": 1e3 * V, "xCurrent_A": F,
+          "yCurrent_A": NOISE},
+         {"x": {"position": "xPos_mm", "current": "xCurrent_A"},
+          "y": {"position": "yPos_mm", "current": "yCurrent_A"}}, ""),
+        ({"one": T, "two": NOISE, "three": V, "four": Q, "five": F},
+         {"x": {"position": "four", "velocity": "three", "force": "five"}}, ""),
+        ({"one": T, "two": F, "three": NOISE, "four": Q},
+         {"x": {"position": "four", "force": "two"}}, ""),
+        # what follows the position is its setpoint and no force
         ({"a": T, "b": REACHED, "c": SPEED, "d": GOAL, "e": PUSH},
-         {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"},
+         {"x": {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"}},
          "goes as the position, 30 ms ahead of it"),
         ({"a": T, "b": GOAL, "c": RATE_OF_GOAL, "d": REACHED, "e": SPEED, "f": PUSH},
-         {"position": "d", "velocity": "e", "setpoint_position": "b", "setpoint_velocity": "c",
-          "force": "f"}, "setpoint_velocity"),
+         {"x": {"position": "d", "velocity": "e", "setpoint_position": "b",
+                "setpoint_velocity": "c", "force": "f"}}, "setpoint_velocity"),
         ({"a": T, "b": GOAL, "c": REACHED, "d": MOVES_A_MASS},
-         {"position": "c", "setpoint_position": "b", "force": "d"}, "explains 97 % of d"),
+         {"x": {"position": "c", "setpoint_position": "b", "force": "d"}}, "explains 97 % of d"),
         ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
-         {"position": "angle", "setpoint_position": "u", "force": "w"}, 'unit = "deg"'),
+         {"x": {"position": "angle", "setpoint_position": "u", "force": "w"}}, 'unit = "deg"'),
         ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
-         {"position": "present_position", "setpoint_position": "goal", "force": "load"}, ""),
+         {"x": {"position": "present_position", "setpoint_position": "goal", "force": "load"}}, ""),
         ({"t": T, "pos": REACHED, "push": 40.0 * REACHED + 0.1 * PUSH},
-         {"position": "pos", "force": "push"}, ""),  # a spring's, of another size
+         {"x": {"position": "pos", "force": "push"}}, ""),  # a spring's, of another size
     ],
 )  # fmt: skip
-def test_what_follows_the_position_is_its_setpoint_and_no_force(tmp_path, columns, expected, told):
+def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, told):
     write_csv(tmp_path / "a.csv", columns)
     found = guess_map(tmp_path / "a.csv")
     assert not found.missing
-    assert columns_of(tmp_path, found.text) == {"x": expected}
+    assert columns_of(tmp_path, found.text) == expected
     assert told in found.text
+    assert "resample" not in found.text  # the steps are even
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
+    assert log.sample_rate == 1000.0
+    moved = log.axes["x"].position
+    assert min(np.abs(moved - column).max() for column in (Q, REACHED)) < 1e-9
 
 
 def test_a_table_may_have_neither_names_nor_a_velocity(tmp_path):
@@ -211,8 +201,7 @@ def test_import_check_and_the_report_say_it(guessed):
 def test_import_says_where_a_name_has_another_unit_and_where_no_force_can_be(
     tmp_path: Path, current: str, said: str
 ) -> None:
-    rows = "\n".join(f"{np.sin(0.01 * k)},{np.cos(0.01 * k)}" for k in range(1000))
-    (tmp_path / "a.csv").write_text(f"x_m,i [A]\n{rows}\n")
+    write_csv(tmp_path / "a.csv", {"x_m": Q, "i [A]": F})
     position = 'position = {column = "x_m", unit = "mm"}'  # which may be a motor's, no length
     text = f"sample_rate = 1000.0\n[axes.x]\n{position}\ncurrent = {current}\n"
     (tmp_path / "map.toml").write_text(text)
@@ -264,38 +253,47 @@ def lines_of(folder: Path, columns: dict[str, np.ndarray]) -> dict[str, str]:
 INDEX = np.arange(len(T), dtype=float)
 
 
-@pytest.mark.parametrize(
-    ("name", "entry", "line"),
-    [
-        ("Sample", "sample_rate", "1000.0 # Hz, ASSUMED: Sample counts the rows"),
-        ("t", "sample_rate", "1000.0 # Hz, ASSUMED: t counts the rows"),
-        ("t_ms", "time", '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the'),
-    ],
-)
-def test_the_number_of_a_row_is_no_time(tmp_path, name, entry, line):
-    found = lines_of(tmp_path, {name: INDEX, "pos_mm": 1e3 * Q, "force_N": F})
-    assert found[entry].startswith(line)
-    assert {"time", "sample_rate"} & found.keys() == {entry}
+SLIDE = {"pos_mm": 1e3 * Q, "force_N": F}
+PLAIN = {"position": "", "force": ""}
+
+
+def turning(column, values):
+    return {"time_s": T, "q_rad": REACHED, column: values, "tau_Nm": PUSH}
 
 
 @pytest.mark.parametrize(
-    ("column", "values", "field", "line"),
+    ("columns", "entries"),
     [
-        ("qd_ref_rad", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
-        ("qd_ref", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
-        ("qd_ref", RATE_OF_GOAL, "setpoint_velocity", 'unit = "rad/s"} # so called'),
-        ("velocity [rad]", GOAL, "setpoint_position", 'unit = "rad"} # goes as the position'),
+        # the number of a row is no time
+        ({"Sample": INDEX, **SLIDE},
+         {"sample_rate": "1000.0 # Hz, ASSUMED: Sample counts the rows", **PLAIN}),
+        ({"t": INDEX, **SLIDE},
+         {"sample_rate": "1000.0 # Hz, ASSUMED: t counts the rows", **PLAIN}),
+        ({"t_ms": INDEX, **SLIDE},
+         {"time": '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the', **PLAIN}),
+        # the unit and the data decide against a name
+        *((turning(name, GOAL),
+           {"time": "", "setpoint_position": 'unit = "rad"} # goes as the position', **PLAIN})
+          for name in ("qd_ref_rad", "qd_ref", "velocity [rad]")),
+        (turning("qd_ref", RATE_OF_GOAL),
+         {"time": "", "setpoint_velocity": 'unit = "rad/s"} # so called', **PLAIN}),
+        # a unit a second may be of two words, and a letter behind a name need not be its unit
+        ({"time_s": T, **SLIDE, "vel_mm_s": 1e3 * V},
+         {"time": "", "velocity": '"vel_mm_s", unit = "mm/s"} # so called', **PLAIN}),
+        ({"t": T, "theta [rad]": Q, "tau_m": F, "qd_m": V},
+         {"time": "", "position": "", "force": '{column = "tau_m"',
+          "velocity": '{column = "qd_m"'}),
+        # amperes are a current
+        *(({"t": T, "pos [mm]": 1e3 * Q, name: F},
+           {"time": "", "position": "", "current": 'unit = "A"'})
+          for name in ("Strom [A]", "torque [A]")),
     ],
-)
-def test_the_unit_and_the_data_decide_against_a_name(tmp_path, column, values, field, line):
-    found = lines_of(tmp_path, {"time_s": T, "q_rad": REACHED, column: values, "tau_Nm": PUSH})
-    assert found.keys() == {"time", "position", field, "force"}
-    assert line in found[field]
-
-
-def test_a_unit_a_second_may_be_of_two_words(tmp_path):
-    columns = {"time_s": T, "pos_mm": 1e3 * Q, "vel_mm_s": 1e3 * V, "force_N": F}
-    assert '"vel_mm_s", unit = "mm/s"} # so called' in lines_of(tmp_path, columns)["velocity"]
+)  # fmt: skip
+def test_an_entry_has_its_column_and_unit_with_the_reason(tmp_path, columns, entries):
+    found = lines_of(tmp_path, columns)
+    assert found.keys() == entries.keys()
+    for entry, line in entries.items():
+        assert line in found[entry]
 
 
 def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
@@ -303,19 +301,6 @@ def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
     write_csv(tmp_path / "a.csv", columns)
     text = guess_map(tmp_path / "a.csv").text
     assert "# not used: qd: correlates with the rate of q_rad by 0." in text
-
-
-def test_a_letter_behind_a_name_need_not_be_its_unit(tmp_path):
-    found = lines_of(tmp_path, {"t": T, "theta [rad]": Q, "tau_m": F, "qd_m": V})
-    assert found["force"].startswith('{column = "tau_m"')
-    assert found["velocity"].startswith('{column = "qd_m"')
-
-
-@pytest.mark.parametrize("name", ["Strom [A]", "torque [A]"])
-def test_amperes_are_a_current(tmp_path, name):
-    found = lines_of(tmp_path, {"t": T, "pos [mm]": 1e3 * Q, name: F})
-    assert found.keys() == {"time", "position", "current"}
-    assert 'unit = "A"' in found["current"]
 
 
 def test_counts_have_an_assumed_scale_that_is_told(tmp_path):

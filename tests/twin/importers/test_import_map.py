@@ -3,10 +3,12 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from import_cases import mapping, write_csv
 
 from twin.errors import InputError
-from twin.importers import ImportMap, load_mapping
+from twin.importers import import_log, load_mapping
 from twin.importers.mapping import find_unit
 
 GOOD = """
@@ -17,21 +19,15 @@ force = {column = "u", unit = "V", scale = 35.0}
 """
 
 
-def load(folder: Path, text: str) -> ImportMap:
-    path = folder / "map.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_mapping(path)
-
-
 def test_the_map_keeps_its_text_and_names_its_columns_once(tmp_path: Path) -> None:
     text = GOOD + '[axes.y]\nposition = {column = "q", unit = "m"}\n'
     text += 'current = {column = 3, unit = "mA"}\nforce_constant = 53.4\n'
-    mapping = load(tmp_path, text)
-    assert mapping.text == text
-    assert mapping.column_names() == ("q", "u", "3")
-    assert mapping.sample_rate == 1000.0
-    assert mapping.axes["y"].force_constant == 53.4
-    assert mapping.axes["x"].units["force"] == "N"
+    found = mapping(tmp_path, text)
+    assert found.text == text
+    assert found.column_names() == ("q", "u", "3")
+    assert found.sample_rate == 1000.0
+    assert found.axes["y"].force_constant == 53.4
+    assert found.axes["x"].units["force"] == "N"
 
 
 @pytest.mark.parametrize(
@@ -81,7 +77,7 @@ def replaced(old: str, new: str) -> str:
 )
 def test_a_wrong_map_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as raised:
-        load(tmp_path, text)
+        mapping(tmp_path, text)
     assert "map.toml" in str(raised.value)
     assert "\n" not in str(raised.value)
 
@@ -89,3 +85,47 @@ def test_a_wrong_map_is_refused_in_one_line(tmp_path: Path, text: str, message: 
 def test_a_missing_map_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.toml: cannot be read"):
         load_mapping(tmp_path / "none.toml")
+
+
+RATIOS = np.array([[45.0, 0.0], [32.0, -32.0]])  # motor turns a joint turn; the wrist is coupled
+GEARS = ("{elbow = 45.0}", "{elbow = 32.0, wrist = -32.0}")
+
+
+def imported(folder, gears=GEARS, wrist_velocity=True):
+    """What the importer makes of the motors' columns of two joints; and these, (2, 3, n)."""
+    rng = np.random.default_rng(3)
+    position, velocity, torque = rng.normal(size=(3, 2, 100))
+    motors = np.stack([RATIOS @ position, RATIOS @ velocity, np.linalg.solve(RATIOS.T, torque)])
+    names = [f"{signal}{i}" for signal in "pvt" for i in range(2)]
+    write_csv(folder / "log.csv", dict(zip(names, motors.reshape(6, -1), strict=True)))
+    text = "sample_rate = 1000.0\n"
+    for i, (axis, gear) in enumerate(zip(("elbow", "wrist"), gears, strict=True)):
+        text += f'[axes.{axis}]\ngear = {gear}\nposition = {{column = "p{i}", unit = "rad"}}\n'
+        if wrist_velocity or i == 0:
+            text += f'velocity = {{column = "v{i}", unit = "rad/s"}}\n'
+        text += f'current = {{column = "t{i}", unit = "A"}}\nforce_constant = 0.5\n'
+    log = import_log(folder / "log.csv", mapping(folder, text))
+    return log, np.stack([position, velocity, 0.5 * torque])
+
+
+def test_joints_have_their_own_motion_and_torque(tmp_path):
+    log, wanted = imported(tmp_path)
+    for i, axis in enumerate(log.axes.values()):
+        found = axis.position, axis.columns["velocity"], axis.force
+        np.testing.assert_allclose(found, wanted[:, i], rtol=1e-9, atol=1e-12)
+        assert axis.kind.rotary
+
+
+@pytest.mark.parametrize(
+    ("gears", "velocity", "said"),
+    [
+        (("{elbow = 1.0}", "{elbow = 2.0}"), True, "do not tell all joints"),
+        (("{elbow = 1.0}", "{hand = 2.0}"), True, "has no axis 'hand'; it has elbow, wrist"),
+        (GEARS, False, "axes.wrist: has no velocity, but is coupled"),
+    ],
+)
+def test_what_cannot_be_brought_to_joints_is_one_line(tmp_path, gears, velocity, said):
+    if not velocity:  # the elbow's motor turns with the wrist
+        gears = ("{elbow = 45.0, wrist = 1.0}", gears[1])
+    with pytest.raises(InputError, match=said):
+        imported(tmp_path, gears, wrist_velocity=velocity)

@@ -7,40 +7,231 @@ sample that is kept must be the one that was written.
 
 import re
 import tracemalloc
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from damage_cases import (
-    CHUNKS,
-    COUNT,
-    CRC_AT,
-    DRAWN,
-    LOG,
-    RATE,
-    Case,
-    account,
-    flipped,
-    kept,
-    recovered,
-    runs_without,
-    samples_of,
-    spoilt,
-    without,
-    written,
-)
 from log_cases import assert_same_log, assert_same_samples, two_axes, write_together
 from mcap.opcode import Opcode
 from mcap.records import Attachment, ChunkIndex
-from mcap_bytes import of, parsed
+from mcap_bytes import Piece, of, parsed, records
 
 from twin.errors import InputError
 from twin.files import UNFINISHED
-from twin.logs import AxisLog, Log, read_log, recover_file, recover_log, write_log
+from twin.logs import AxisLog, Log, Recovery, read_log, recover_file, recover_log, write_log
+
+RATE, COUNT, PER_CHUNK = 500.0, 33, 7
+CHUNKS = -(-COUNT // PER_CHUNK)
+ROW = 31 + 4 * 12
+NAMES = ("position", "velocity", "current", "force")
+LOG = Log(
+    RATE,
+    {"x": AxisLog({n: 1e3 * i + np.arange(COUNT) for i, n in enumerate(NAMES, 1)})},
+    {"source": "a test"},
+    attachments={"model.toml": b"mass = 1.0\n"},
+)
+CRC_AT = 9 + 24  # of a chunk record
+
+
+@dataclass(frozen=True)
+class Case:
+    """The bytes of the log and its records."""
+
+    data: bytes
+    records: list[Piece]
+
+    @property
+    def chunks(self) -> list[Piece]:
+        """Its chunk records."""
+        return [r for r in self.records if r.opcode == Opcode.CHUNK]
+
+    def behind(self, number: int) -> int:
+        """End of the message indexes behind a chunk."""
+        following = [r for r in self.records if r.start >= self.chunks[number].end]
+        return next(r.start for r in following if r.opcode != Opcode.MESSAGE_INDEX)
+
+
+def samples_of(*chunks: int) -> set[int]:
+    """Numbers of the samples in chunks."""
+    return {k for k in range(COUNT) if k // PER_CHUNK in chunks}
+
+
+def span(count: str, seconds: str) -> set[int]:
+    """Numbers of so many samples from a time on."""
+    first = round(float(seconds) * RATE)
+    return set(range(first, first + int(count)))
+
+
+@dataclass(frozen=True)
+class Account:
+    """Samples by what became of them, as the sentences of a recovery state it."""
+
+    kept: set[int]
+    left_out: list[set[int]]
+    damaged: set[int]
+
+    @property
+    def all(self) -> set[int]:
+        """Every sample that is spoken of."""
+        return self.kept.union(self.damaged, *self.left_out)
+
+
+def account(case: Case, recovery: Recovery) -> Account:
+    """Read the sentences; a chunk is damaged where it or bytes of it are named."""
+    left_out, damaged = [], set()
+    for sentence in recovery.lost:
+        if found := re.match(
+            r"(\d+) intact samples from (\S+) s are in a log of their own", sentence
+        ):
+            left_out.append(span(*found.groups()))
+        for number, chunk in enumerate(case.chunks):
+            if re.search(rf"[Cc]hunk (record )?at byte {chunk.start}: ", sentence):
+                damaged |= samples_of(number)
+            if found := re.match(r"bytes (\d+) to (\d+): ", sentence):
+                first, last = (int(g) for g in found.groups())
+                if first < chunk.end and last >= chunk.start:
+                    damaged |= samples_of(number)
+        if found := re.match(r"/axis/x: (\d+) samples are missing, from (\S+) s to", sentence):
+            damaged |= span(*found.groups())
+    return Account(kept(recovery.kept), left_out, damaged)
+
+
+def kept(text: str) -> set[int]:
+    """The samples of a sentence."""
+    match = re.fullmatch(r"(\d+) samples from (\S+) s", text)
+    assert match or text == f"all {COUNT} samples", text
+    return span(*match.groups()) if match else set(range(COUNT))
+
+
+def recovered(path: Path, data: bytes) -> tuple[Log, Recovery]:
+    """The file is refused by strict reading; what is recovered is what was written."""
+    path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        read_log(path)
+    log, recovery = recover_log(path)
+    assert recovery.lost
+    assert all("\n" not in loss for loss in recovery.lost)
+    assert str(caught.value).removeprefix(f"{path}: ").startswith(recovery.lost[0])
+    assert log.metadata["recovered"] == recovery.kept
+    for part in (log, *recovery.others):
+        where = sorted(kept(part.metadata["recovered"]))
+        assert len(part) == len(where)
+        for field, column in LOG.axes["x"].columns.items():
+            np.testing.assert_array_equal(part.axes["x"].columns[field], column[where])
+    return log, recovery
+
+
+def spoilt(case: Case, *chunks: int) -> bytes:
+    """Flip a bit of the compressed samples of some chunks."""
+    return flipped(case.data, *(case.chunks[number].end - 20 for number in chunks), mask=0x40)
+
+
+def without(case: Case, data: bytes, gone: set[int]) -> Case:
+    """Changed bytes of the log less some chunks, and where in them the others are."""
+    cuts = [case.chunks[number] for number in sorted(gone)]
+    left = bytearray(data)
+    for chunk in reversed(cuts):
+        del left[chunk.start : chunk.end]
+    moved = []
+    for number, chunk in enumerate(case.chunks):
+        shift = sum(c.end - c.start for c in cuts if c.start < chunk.start)
+        place = (-1, -1) if number in gone else (chunk.start - shift, chunk.end - shift)
+        moved.append(replace(chunk, start=place[0], end=place[1]))
+    return Case(bytes(left), moved)
+
+
+def flipped(data: bytes, *places: int, mask: int = 1) -> bytes:
+    """The bytes with these bits flipped at some places."""
+    out = bytearray(data)
+    for place in places:
+        out[place] ^= mask
+    return bytes(out)
+
+
+def damage(path: Path, *chunks: int) -> None:
+    """Flip a bit of the samples in some chunks of a file."""
+    ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
+    path.write_bytes(flipped(path.read_bytes(), *(ends[number] - 50 for number in chunks)))
+
+
+def runs_without(*missing: int) -> list[set[int]]:
+    """Samples of the stretches of chunks between those missing."""
+    runs: list[set[int]] = [set()]
+    for number in range(CHUNKS):
+        if number in missing:
+            runs.append(set())
+        else:
+            runs[-1] |= samples_of(number)
+    return [r for r in runs if r]
+
+
+# Damage drawn at random: the bytes, and the chunks that it touched
+
+Damage = tuple[bytes, set[int]]
+
+
+def _overwritten(case: Case, start: int, new: bytes) -> Damage:
+    end = start + len(new)
+    touched = {i for i, c in enumerate(case.chunks) if c.start < end and start < c.end}
+    return case.data[:start] + new + case.data[end:], touched
+
+
+def _anywhere(case: Case, rng: np.random.Generator) -> int:
+    return int(rng.integers(case.chunks[0].start, case.chunks[-1].end))
+
+
+def zeros(case: Case, rng: np.random.Generator) -> Damage:
+    return _overwritten(case, _anywhere(case, rng), bytes(int(rng.integers(1, 600))))
+
+
+def noise(case: Case, rng: np.random.Generator) -> Damage:
+    return _overwritten(case, _anywhere(case, rng), rng.bytes(int(rng.integers(1, 600))))
+
+
+def bytes_gone(case: Case, rng: np.random.Generator) -> Damage:
+    start, size = _anywhere(case, rng), int(rng.integers(1, 300))
+    _, touched = _overwritten(case, start, bytes(size))
+    return case.data[:start] + case.data[start + size :], touched
+
+
+def bytes_more(case: Case, rng: np.random.Generator) -> Damage:
+    start = _anywhere(case, rng)
+    touched = {i for i, c in enumerate(case.chunks) if c.start < start < c.end}
+    return case.data[:start] + rng.bytes(int(rng.integers(1, 300))) + case.data[start:], touched
+
+
+def swapped(case: Case, rng: np.random.Generator) -> Damage:
+    i, j = sorted(rng.choice(CHUNKS, 2, replace=False))
+    a, b = case.chunks[i].start, case.behind(i)
+    c, d = case.chunks[j].start, case.behind(j)
+    data = case.data
+    return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:], set()
+
+
+def doubled(case: Case, rng: np.random.Generator) -> Damage:
+    i = int(rng.integers(CHUNKS))
+    start, end = case.chunks[i].start, case.behind(i)
+    return case.data[:end] + case.data[start:end] + case.data[end:], set()
+
+
+DRAWN: tuple[Callable[[Case, np.random.Generator], Damage], ...] = (
+    zeros,
+    noise,
+    bytes_gone,
+    bytes_more,
+    swapped,
+    doubled,
+)
 
 
 @pytest.fixture(scope="module")
 def intact(tmp_path_factory) -> Case:
-    case = written(tmp_path_factory.mktemp("log") / "a.mcap")
+    path = tmp_path_factory.mktemp("log") / "a.mcap"
+    write_log(LOG, path, chunk_bytes=PER_CHUNK * ROW)
+    data = path.read_bytes()
+    case = Case(data, records(data))
     assert len(case.chunks) == CHUNKS
     return case
 
@@ -235,7 +426,8 @@ def test_what_damage_did_not_touch_comes_back_whatever_else_is_lost(tmp_path, se
 @pytest.mark.parametrize("layout", ["apart", "together"])
 def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, layout):
     """Of more samples than are held at a time."""
-    path, count = tmp_path / "a.mcap", 40_000 if layout == "apart" else 2_000
+    count = 40_000 if layout == "apart" else 2_000
+    path = tmp_path / f"good.mcap{UNFINISHED}"  # the name of the recording that it becomes
     column = np.arange(float(count))
     axis = AxisLog({"position": column, "force": -column})
     log = Log(1e4, {"x": axis, "y": AxisLog({"position": column + 0.5, "force": column})})
@@ -243,8 +435,7 @@ def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, lay
         write_log(log, path, chunk_bytes=200_000)
     else:
         write_together(path, log)
-    ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
-    path.write_bytes(flipped(path.read_bytes(), ends[4] - 50, ends[5] - 50))
+    damage(path, 4, 5)
     log, wanted = recover_log(path)
     recovery, files = recover_file(path, tmp_path / "good.mcap")
     assert (recovery.kept, recovery.lost) == (wanted.kept, wanted.lost)
@@ -267,8 +458,7 @@ def test_a_recovery_takes_little_memory(tmp_path):
     noise = np.random.default_rng(1).standard_normal((2, 1_500_000))
     path = tmp_path / "a.mcap"
     write_log(Log(1e4, {"x": AxisLog({"position": noise[0], "force": noise[1]})}), path)
-    ends = [r.end for r in of(path.read_bytes(), Opcode.CHUNK)]
-    path.write_bytes(flipped(path.read_bytes(), ends[20] - 50))
+    damage(path, 20)
     tracemalloc.start()
     recover_file(path, tmp_path / "b.mcap")
     peak = tracemalloc.get_traced_memory()[1]
@@ -292,18 +482,10 @@ def test_a_chunk_is_found_wherever_it_lies(tmp_path):
             assert_same_samples(recover_log(path)[0], log)
 
 
-def test_what_is_recovered_from_is_there_to_the_last(tmp_path):
-    """Also where it bears the name of the recording that it becomes, but not of what is written."""
-    write_log(TWO, tmp_path / "b.mcap", chunk_bytes=20_000)
-    ends = [r.end for r in of((tmp_path / "b.mcap").read_bytes(), Opcode.CHUNK)]
-    source = (tmp_path / "b.mcap").rename(tmp_path / f"a.mcap{UNFINISHED}")
-    source.write_bytes(flipped(source.read_bytes(), *(end - 50 for end in ends[12:15])))
-    wanted, told = recover_log(source)
-    _, files = recover_file(source, tmp_path / "a.mcap")
-    assert len(files) == 2
-    for file, log in zip(files, (wanted, *told.others), strict=True):
-        assert_same_samples(read_log(file), log)
-    named = source.rename(tmp_path / "good.part1.mcap")
+def test_what_is_recovered_from_is_not_written_over(tmp_path):
+    named = tmp_path / "good.part1.mcap"
+    write_log(TWO, named, chunk_bytes=20_000)
+    damage(named, 12)
     broken = named.read_bytes()
     with pytest.raises(InputError, match="would be overwritten; give another name"):
         recover_file(named, tmp_path / "good.mcap")

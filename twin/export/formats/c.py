@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from math import ceil
 
 from twin.core.native import LONGEST_STEP
-from twin.effect import IO_SIZE, Effect, Kind
+from twin.effect import IO_SIZE, Kind
 from twin.errors import InputError
-from twin.export import Exported, Exporter, Remark, axis_identifiers, filled, identifier
+from twin.export import Exported, Exporter, Held, Remark, axis_identifiers, filled, identifier
 from twin.export.c_law import SLOTS, CannotTranslate, CLaws
 from twin.feedforward import followed
 from twin.logs import Log
@@ -21,23 +21,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 
 MOTION = ("position", "velocity", "acceleration")
 IMPOSED = "1e300"  # kg: along an imposed motion friction slides wherever it moves
-
-
-@dataclass(frozen=True)
-class LawCode:
-    """An effect with its values, and the C function of its law."""
-
-    fitted: Fitted
-    function: str
-
-    @property
-    def effect(self) -> Effect:
-        return self.fitted.effect
-
-    @property
-    def name(self) -> str:
-        """Of the effect."""
-        return self.effect.name
 
 
 @dataclass(frozen=True)
@@ -50,19 +33,26 @@ class AxisCode:
     """With which its C names begin: PREFIX_force, PREFIX_state."""
     axis: AxisModel
     """With the effects that are kept."""
-    laws: tuple[LawCode, ...]
-    """The effects in the order of a sample."""
+    functions: dict[str, str]
+    """The C functions of their laws by effect, in the order of a sample."""
     period: float
     """s, from one call to the next."""
     ahead: float
     """By how much the setpoint has to come early, s."""
     ends: dict[str, tuple[float, float]]
     """90 % intervals by the label of a parameter."""
+    held: Held
+    """What becomes of its effects."""
+
+    @property
+    def effects(self) -> list[Fitted]:
+        """The effects in the order of a sample."""
+        return [self.axis[name] for name in self.functions]
 
     @property
     def reads_other(self) -> bool:
         """Whether the motion of the other axis is an argument too."""
-        return any(law.effect.reads_other_axis for law in self.laws)
+        return any(f.effect.reads_other_axis for f in self.effects)
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -77,26 +67,26 @@ class AxisCode:
     @property
     def rubs_by_itself(self) -> bool:
         """Whether friction depends on the force that moves the axis."""
-        return any(law.effect.reads("U") for law in self.of("MODIFIER", "FRICTION"))
+        return any(f.effect.reads("U") for f in self.of("MODIFIER", "FRICTION"))
 
     @property
-    def standing(self) -> list[LawCode]:
+    def standing(self) -> list[Fitted]:
         """Attached masses that move against the net force, such as a base."""
-        return [law for law in self.of("STRUCTURE") if law.effect.reads("NET")]
+        return [f for f in self.of("STRUCTURE") if f.effect.reads("NET")]
 
     @property
-    def riding(self) -> list[LawCode]:
+    def riding(self) -> list[Fitted]:
         """Attached masses that move with the axis."""
-        return [law for law in self.of("STRUCTURE") if not law.effect.reads("NET")]
+        return [f for f in self.of("STRUCTURE") if not f.effect.reads("NET")]
 
     @property
     def steps(self) -> int:
         """In which the attached masses take a period."""
         return 1 if self.standing else ceil(self.period / LONGEST_STEP - 1e-9)
 
-    def of(self, *kinds: str) -> list[LawCode]:
+    def of(self, *kinds: str) -> list[Fitted]:
         """The effects of some kinds, kind by kind."""
-        return [law for kind in kinds for law in self.laws if law.effect.kind is Kind[kind]]
+        return [f for kind in kinds for f in self.effects if f.effect.kind is Kind[kind]]
 
     def signature(self, what: str) -> str:
         """Of its function for force or current."""
@@ -106,23 +96,12 @@ class AxisCode:
 
 @dataclass(frozen=True)
 class CSource:
-    """The two files of a machine, and what they lack of it."""
+    """The two files of a machine."""
 
     name: str
     header: str
     source: str
     axes: tuple[AxisCode, ...]
-    approximated: tuple[Remark, ...]
-    lost: tuple[Remark, ...]
-
-    @property
-    def kept(self) -> dict[str, tuple[str, ...]]:
-        """By axis, what is kept as it is."""
-        less, kept = {(r.axis, r.part) for r in (*self.approximated, *self.lost)}, {}
-        for a in self.axes:
-            effects = (n for n in a.axis.names if (a.name, n) not in less)
-            kept[a.name] = (a.axis.units.mass_name, *effects)
-        return kept
 
 
 def c_source(model: MachineModel) -> CSource:
@@ -134,44 +113,48 @@ def c_source(model: MachineModel) -> CSource:
         )
     model.require_mass()
     name, names, laws = identifier(model.name), axis_identifiers(model), CLaws()
-    axes, approximated, lost = list[AxisCode](), list[Remark](), list[Remark]()
+    axes = []
     for axis_name, axis in model.axes.items():
         found = followed(axis)
-        made, left = [], dict(found.lost)
+        functions, left = {}, dict(found.lost)
         for f in sorted(found.axis.effects, key=lambda f: f.effect.turn):
             try:
                 CLaws().law(f.effect.law)  # so that half a law is not left among the others
-                made.append(LawCode(f, laws.law(f.effect.law)))
+                functions[f.effect.name] = laws.law(f.effect.law)
             except CannotTranslate as error:
                 left[f.effect.name] = f"its law cannot be written in C: {error}"
         nearly = {n: t for n, t in found.approximated.items() if n not in left}
-        for law in made:
-            if law.effect.kind is Kind.STRUCTURE and model.period > LONGEST_STEP:
-                nearly[law.name] = "the acceleration is held from one call to the next"
-        approximated += [Remark(axis_name, *item) for item in nearly.items()]
-        lost += [Remark(axis_name, *item) for item in left.items()]
+        for effect in functions:
+            if axis[effect].effect.kind is Kind.STRUCTURE and model.period > LONGEST_STEP:
+                nearly[effect] = "the acceleration is held from one call to the next"
+        kept = (n for n in found.axis.names if n not in nearly and n not in left)
+        held = Held(
+            (axis.units.mass_name, *kept),
+            tuple(Remark(axis_name, *item) for item in nearly.items()),
+            tuple(Remark(axis_name, *item) for item in left.items()),
+        )
         intervals = model.intervals.get(axis_name)
         axes.append(
             AxisCode(
-                axis_name, f"{name}_{names[axis_name]}", found.axis, tuple(made), model.period,
-                found.ahead(model.period), dict(intervals.ends) if intervals else {},
+                axis_name, f"{name}_{names[axis_name]}", found.axis, functions, model.period,
+                found.ahead(model.period), dict(intervals.ends) if intervals else {}, held,
             )
         )  # fmt: skip
     header, source = (
         filled(
-            f"model.{kind}", model=model, name=name, axes=axes, approximated=approximated,
-            lost=lost, laws=laws.text, slots=SLOTS, io_size=IO_SIZE, imposed=IMPOSED,
+            f"model.{kind}", model=model, name=name, axes=axes, laws=laws.text, slots=SLOTS,
+            io_size=IO_SIZE, imposed=IMPOSED,
         )
         for kind in ("h", "c")
     )  # fmt: skip
-    return CSource(name, header, source, tuple(axes), tuple(approximated), tuple(lost))
+    return CSource(name, header, source, tuple(axes))
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """A header and a source file."""
     made = c_source(model)
-    files: dict[str, str | bytes] = {f"{made.name}.h": made.header, f"{made.name}.c": made.source}
-    return Exported(files, made.kept, made.approximated, made.lost)
+    files = {f"{made.name}.h": made.header, f"{made.name}.c": made.source}
+    return Exported(files, {a.name: a.held for a in made.axes})
 
 
 EXPORTER = Exporter(

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twin.export import Exported, Exporter, axis_identifiers
-from twin.export.tables import AxisTables, exported, judged_axes
+from twin.export import Exported, Exporter
+from twin.export.tables import Judged, exported, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array
@@ -15,15 +15,11 @@ from twin.signals import Array
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """A file for each table of each axis."""
-    found, names = judged_axes(model, logs, lambda tables: tables), axis_identifiers(model)
-    files: dict[str, str | bytes] = {}
-    for name, axis in model.axes.items():
-        files |= _files(names[name], axis, found[name].tables)
-    return exported(files, found)
+    return exported(model, judged_axes(model, logs, lambda tables: tables), _files)
 
 
-def _files(name: str, axis: AxisModel, of: AxisTables) -> dict[str, str]:
-    units = axis.units
+def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
+    units, of = axis.units, found.tables
     force, position = f"{units.words('force')} ({units.force})", f"({units.position})"
     place = f"{units.words('position')} {position}"
     mass = f"{units.mass_name} ({units.mass})"

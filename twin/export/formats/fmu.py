@@ -14,6 +14,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from twin.export import Exported, Exporter, Remark, filled, identifier
@@ -55,8 +56,11 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
             # of a file in a zip: the same model gives the same bytes
             oldest = (1980, 1, 1, 0, 0, 0)
             archive.writestr(zipfile.ZipInfo(name, oldest), content)
-    lost = (*made.lost, *(Remark(a.name, "binary", why) for a in made.axes if why))
-    return Exported({f"{made.name}.fmu": stream.getvalue()}, made.kept, made.approximated, lost)
+    held = {}
+    for a in made.axes:
+        absent = (Remark(a.name, "binary", why),) if why else ()
+        held[a.name] = replace(a.held, lost=(*a.held.lost, *absent))
+    return Exported({f"{made.name}.fmu": stream.getvalue()}, held)
 
 
 def _inputs(a: AxisCode) -> list[Signal]:

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from twin.core.walks import walk
 from twin.effect import Kind
 from twin.errors import InputError
-from twin.export import Exported, Exporter, Loss, Remark
+from twin.export import Exported, Exporter, Held, Loss, Remark
+from twin.feedforward import imposed
 from twin.logs import Log
-from twin.model.machine import AxisModel, MachineModel, axis_table
+from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.mechanism import PASSIVE
 from twin.mujoco.mjcf import read_spec
 from twin.mujoco.written import in_mjcf, with_joint, with_motor
@@ -48,13 +48,8 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     if model.joints:
         for moved in (j for j in spec.joints if j.name not in model.joints.values()):
             text = with_joint(text, moved.name, _changed(moved, {}))
-    judged = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
-    return Exported(
-        {f"{Path(name).stem}.xml": text},
-        {axis: kept for axis, (kept, _, _) in judged.items()},
-        tuple(r for _, nearly, _ in judged.values() for r in nearly),
-        tuple(r for _, _, lost in judged.values() for r in lost),
-    )
+    held = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
+    return Exported({f"{Path(name).stem}.xml": text}, held)
 
 
 def attributes_of(axis: AxisModel) -> dict[str, float]:
@@ -115,9 +110,7 @@ def _gear(spec: Any, joint: str) -> float:
     return float(gears[0]) if len(gears) == 1 else 0.0
 
 
-def _judged(
-    model: MachineModel, axis: str, logs: Mapping[str, Log], by_motor: bool
-) -> tuple[tuple[str, ...], list[Remark], list[Remark]]:
+def _judged(model: MachineModel, axis: str, logs: Mapping[str, Log], by_motor: bool) -> Held:
     """Which effects of an axis the joint holds, holds nearly, and does not hold.
 
     by_motor: whether its motor holds its friction.
@@ -141,24 +134,17 @@ def _judged(
             text = loss.on(on, unit) if loss.size else UNKNOWN
             none = loss.is_most or not loss.size
             (lost if none else nearly).append(Remark(axis, f.effect.name, text))
-    return tuple(kept), nearly, lost
+    return Held(tuple(kept), tuple(nearly), tuple(lost))
 
 
 def _loss(alone: AxisModel, held: Mapping[str, float], motions: list[tuple[Array, float]]) -> Loss:
     """What the attributes lose of one effect while the axis moves."""
     whole, left = [], []
     for motion, period in motions:
-        table = axis_table({"": alone})
-        rows = np.zeros((len(table.entries), motion.shape[1]))
-        first, last, state, _, _ = table.axes[0]
-        walk(
-            table.entries, first, last, table.parameters, np.zeros(table.n_states), state, motion,
-            np.zeros_like(motion), period, 0, rows, alone.mass,
-        )  # fmt: skip
+        made = imposed(alone, motion, np.zeros_like(motion), period)
         x, v = motion[:2]
         force = -held.get("frictionloss", 0.0) * np.sign(v) - held.get("damping", 0.0) * v
         force -= held.get("stiffness", 0.0) * (x - held.get("springref", 0.0))
-        made = rows.sum(axis=0)
         whole.append(made[v != 0.0])
         left.append((made - force)[v != 0.0])
     sizes = (np.concatenate(parts) for parts in (whole, left))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.export import Exported, Exporter, axis_identifiers, filled, identifier
-from twin.export.tables import AxisTables, exported, judged_axes
+from twin.export.tables import AxisTables, judged_axes
 from twin.logs import Log
 from twin.model.machine import MachineModel
 
@@ -27,7 +27,7 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
         f"{name}_{file}": filled(file, name=name, axes=axes, tables=tables)
         for file in ("joint_limits.yaml", "joints.urdf")
     }
-    return exported(files, found)
+    return Exported(files, found)
 
 
 def _straight(of: AxisTables) -> AxisTables:

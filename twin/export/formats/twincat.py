@@ -12,7 +12,7 @@ from math import degrees
 
 import numpy as np
 
-from twin.export import Exported, Exporter, Remark, axis_identifiers, filled
+from twin.export import Exported, Exporter, Remark, filled
 from twin.export.formats.csv import csv_text
 from twin.export.tables import ENTRIES, AxisTables, Judged, exported, fewest_points, judged_axes
 from twin.logs import Log
@@ -21,14 +21,11 @@ from twin.model.machine import AxisModel, MachineModel
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """For each axis a compensation value list, and a file for each effect that repeats."""
-    found, names = judged_axes(model, logs, _held), axis_identifiers(model)
-    files: dict[str, str | bytes] = {}
-    nearly: list[Remark] = []
-    for name, axis in model.axes.items():
-        files |= _files(names[name], axis, found[name])
-        nearly += [Remark(name, "friction table", _points(axis, found[name].tables))]
-    made = exported(files, found)
-    return replace(made, approximated=(*nearly, *made.approximated))
+    found, axes = judged_axes(model, logs, _held), {}
+    for name, own in found.items():
+        points = Remark(name, "friction table", _points(model.axes[name], own.tables))
+        axes[name] = replace(own, approximated=(points, *own.approximated))
+    return replace(exported(model, found, _files), axes=axes)
 
 
 def _held(of: AxisTables) -> AxisTables:

@@ -1,0 +1,128 @@
+"""The times of a table: their rate where they are even, else an even time base to resample to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.importers.mapping import ImportMap
+from twin.logs.log import Array
+from twin.logs.topics import instant
+from twin.numbers import first_not_finite
+
+
+def rate_of(time: Array) -> float:
+    """Sample rate in Hz of times (n,) in s.
+
+    It is the nearest whole number where the times allow that. Raises InputError that names row and
+    time where they do not increase, have a gap, or are off the even grid by more than 1 %.
+    """
+    jitter = 0.01  # of a period: how far a time may be off the even grid
+    _require_finite(time)
+    elapsed = time - time[0]
+    steps = np.diff(elapsed)
+    period = float(np.median(steps))
+    rate = len(steps) / max(float(elapsed[-1]), 1e-9)  # less than none is refused below
+    if abs(round(rate) / rate - 1.0) * len(steps) < jitter:
+        rate = float(round(rate))
+    off = np.abs(elapsed * rate - np.arange(len(time)))
+    for fault, wrong in (
+        ("does not increase", np.append(False, steps <= 0.0)),
+        ("has a gap", np.append(False, steps > 1.5 * period)),
+        (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > jitter),
+    ):
+        if wrong.any():
+            _require_no_hole(time)  # which a clock would not mend
+            row = int(np.argmax(wrong))
+            raise InputError(
+                f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
+                f"in row {row + 1}, usual are {period:.6g} s a sample; give resample = "
+                f"{1.0 / max(period, 1e-9):.6g} (Hz) in the map, or sample_rate in place of time "
+                "where only the printed times are inexact"
+            )
+    return rate
+
+
+def _require_finite(time: Array) -> None:
+    if (k := first_not_finite(time)) is not None:
+        raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
+
+
+def _require_no_hole(time: Array) -> None:
+    steps = np.diff(time)
+    gap = int(np.argmax(steps))
+    longest_gap = 20.0  # usual steps, over which a line is no measurement
+    if steps[gap] > longest_gap * float(np.median(steps)) > 0.0:
+        raise InputError(
+            f"there is nothing between {instant(time[gap])} and {instant(time[gap + 1])}; import "
+            "the parts before and behind it as logs of their own"
+        )
+
+
+def even_times(begin: float, end: float, rate: float) -> Array:
+    """Times in s from ``begin`` to ``end``, of which there are ``rate`` a second."""
+    return begin + np.arange(int((end - begin) * rate * (1.0 + 1e-12)) + 1) / rate
+
+
+@dataclass(frozen=True)
+class TimeBase:
+    """rows: those kept, in the order of time; times: (n,) s of them; grid: (m,) s, even."""
+
+    rows: NDArray[np.intp]
+    times: Array
+    grid: Array
+    dropped: int
+
+    def resampled(self, column: Array) -> Array:
+        """A column (rows of the file,) on the even time base, by straight lines."""
+        return np.asarray(np.interp(self.grid, self.times, column[self.rows]))
+
+    @property
+    def leaves_all(self) -> bool:
+        """Whether the even time base has every row that it spans where it was."""
+        places = np.interp(self.grid, self.times, np.arange(float(len(self.times))))
+        near = 1e-6  # of a step, that a time in s has lost by rounding
+        each = np.rint(places[:1]) + np.arange(len(places))  # row after row
+        return not self.dropped and bool(np.all(np.abs(places - each) < near))
+
+    def costs(self, mapping: ImportMap, columns: Mapping[str, Array]) -> str:
+        """What was resampled, and the RMS error of the straight lines in each signal of a map."""
+        steps, each = np.diff(self.times) * 1e3, []
+        for axis, entry in mapping.axes.items():
+            for field, c in entry.columns.items():
+                kept = columns[c.name][self.rows]
+                between = np.interp(self.times[1:-1:2], self.times[::2], kept[::2])
+                # Of a smooth signal lines twice as long are four times as far off.
+                rms = float(np.sqrt(np.mean((between - kept[1:-1:2]) ** 2))) / 4.0
+                size = c.si.size * abs(float(c.scale)) * rms
+                each.append(f"{axis}.{field} {size:.2g} {entry.units[field]}")
+        rows = "row" if self.dropped == 1 else "rows"
+        dropped = f", {self.dropped} {rows} with a time that does not increase left out"
+        spread = " to ".join(dict.fromkeys(f"{step:.3g}" for step in (steps.min(), steps.max())))
+        return (
+            f"steps of {spread} ms were resampled to "
+            f"{np.median(np.diff(self.grid)) * 1e3:.4g} ms{dropped if self.dropped else ''}; "
+            f"error rms about {', '.join(each)}"
+        )
+
+
+def time_base_of(time: Array, rate: float) -> TimeBase:
+    """The even time base of ``rate`` Hz over the times (n,) in s; raises InputError."""
+    _require_finite(time)
+    increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
+    rows = np.flatnonzero(increasing)
+    kept = time[rows]
+    if len(kept) < 3 or 2 * len(kept) < len(time):
+        raise InputError(f"the time increases in {len(kept)} of {len(time)} rows only")
+    steps = np.diff(kept)
+    usual = float(np.median(steps))
+    if rate * usual > 2.0 or rate * usual < 0.01:
+        raise InputError(
+            f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
+        )
+    _require_no_hole(kept)
+    return TimeBase(rows, kept, even_times(kept[0], kept[-1], rate), len(time) - len(kept))
