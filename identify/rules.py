@@ -17,8 +17,8 @@ class DecisionRule:
     accurate to 10 % on most machines. Above it parameters have no intervals."""
 
     least_part: float = 0.2
-    """Of what is left above the noise floor, the least part that a change must take. What another
-    law leaves of it may hold less by chance; what takes less does not matter."""
+    """Of what is left above the noise floor, the least part that a change must take to be named.
+    Beside a wrong law what is left can shrink by less than that by chance."""
 
     chance: float = 0.05
     """Of a false answer, 1 in 20, for the gain over blocks and beside controls."""
@@ -41,8 +41,8 @@ class DecisionRule:
     """A strength has collapsed if less than this part of it is left."""
 
     rather: float = 0.8
-    """Part of the share of time from which another coordinate is preferred, as within one run any
-    coordinate is a function of time."""
+    """Within one run every coordinate is a function of time. So another one is preferred to time
+    from this part of what time accounts for."""
 
     line_chance: float = 1e-3
     """False-alarm probability below which a spectral line counts."""

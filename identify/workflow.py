@@ -14,6 +14,7 @@ from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
+from identify.dataset.given_logs import require_moving
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import sticks
 from identify.estimation.alignment import aligned, fit_aligned
@@ -309,8 +310,7 @@ def add(
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
-        if name not in before.fits:
-            raise InputError(f"axis {name} does not move in the logs; give a log in which it does")
+        require_moving(name, before.fits)
     open_axes = [n for n in names if effect.name not in model.axes[n].names]
     if not open_axes:
         raise InputError(
@@ -391,6 +391,8 @@ def add_shape(
     effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
+    if axis is not None:
+        require_moving(axis, before.fits)
     fits = {n: before.fits[n] for n in names if n in before.fits}
     progress("adding", 0, 1)
     best, shape = reshape(effect, fits, before.datasets)
@@ -452,10 +454,10 @@ def on_machine(
     given = logs_by_name(logs)
     response = partial(frequency_response, given, model, progress=progress)
     worth = partial(feedforward, model, given, before, progress=progress)
-    return OnMachine(_if_told(response), None if before is None else _if_told(worth))
+    return OnMachine(_or_none(response), None if before is None else _or_none(worth))
 
 
-def _if_told(job: Callable[[], Any]) -> Any:
+def _or_none(job: Callable[[], Any]) -> Any:
     try:
         return job()
     except InputError:

@@ -25,7 +25,7 @@ from identify.analysis.velocity_map import only_axis
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import CONFIDENCE
+from identify.estimation.intervals import CONFIDENCE_LEVEL
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel
@@ -226,7 +226,7 @@ class CableForce:
         found, kept = found.part(between), kept[between]
         smoothed = found.alike @ smoother(found.position, kept).T
         count = len(smoothed)
-        quantile = stdtrit(count - 1, 0.5 + CONFIDENCE / 2.0)
+        quantile = stdtrit(count - 1, 0.5 + CONFIDENCE_LEVEL / 2.0)
         return cls(
             passes=found,
             force=smoothed.mean(axis=0),

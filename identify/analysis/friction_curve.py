@@ -17,7 +17,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from identify.estimation.evidence import evidence
-from identify.estimation.intervals import CONFIDENCE
+from identify.estimation.intervals import CONFIDENCE_LEVEL
 from identify.estimation.least_squares import minimise
 from twin.errors import InputError
 from twin.signals import Array
@@ -112,7 +112,7 @@ def _with_intervals(
     columns = weight[:, None] * np.stack([slopes[n] for n in names], axis=1)
     left, freedom = weight * (curve(speed) - friction), len(speed) - len(names)
     covariance = np.linalg.pinv(columns.T @ columns) * float(left @ left) / freedom
-    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE_LEVEL / 2.0))
     half = (quantile * np.sqrt(np.diag(covariance))).tolist()
     return MapCurve(curve, dict(zip(names, half, strict=True)))
 

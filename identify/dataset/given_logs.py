@@ -86,6 +86,12 @@ def moving_in(
     return going, [name for name in held if name not in going]
 
 
+def require_moving(axis: str, moving: Collection[str]) -> None:
+    """Raise InputError unless an axis is among those that move in the logs."""
+    if axis not in moving:
+        raise InputError(f"axis {axis} does not move in the logs; give a log in which it does")
+
+
 def nothing_moves(axes: Iterable[str], logs: Collection[Log]) -> InputError:
     """Why no axis of a model moves in any training log, and what to do."""
     known = sorted({a for log in logs for a in log.axes})

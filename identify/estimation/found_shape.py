@@ -19,17 +19,16 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import averaged_force, steady_force
 from identify.estimation.free_curves import Shape, sticking
-from identify.estimation.intervals import with_band
+from identify.estimation.intervals import BEYOND, with_band
 from identify.estimation.least_squares import solve
 from identify.estimation.splines import Linearised
-from identify.rules import RULE
 from twin.curve import Coordinate
 from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted
 from twin.model.units import LINEAR
 from twin.signals import Array
 
-BAND = NormalDist().inv_cdf(1.0 - RULE.chance)  # standard deviations, to each side
+BAND = NormalDist().inv_cdf(1.0 - BEYOND)  # standard deviations, to each side
 UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity}
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
 

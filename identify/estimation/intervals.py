@@ -31,13 +31,10 @@ from twin.model.parameters import ParameterReference, read, write
 from twin.signals import Array
 
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
-CONFIDENCE = 1.0 - 2.0 * RULE.chance  # as the truth may be off to either side
-QUANTILE = students_t(RULE.chance, BLOCKS - 1)
+CONFIDENCE_LEVEL = 0.9  # of every interval, as its texts say
+BEYOND = 0.5 * (1.0 - CONFIDENCE_LEVEL)  # chance that the truth is off to one side
+QUANTILE = students_t(BEYOND, BLOCKS - 1)
 FAR = 4.0  # half widths to either side at which the error must have risen
-# Of error to noise floor. Above it the error is more than noise, and what parameters took over of a
-# missing effect, which no residual shows, exceeds their intervals: of 73 given up to twice the
-# floor beside a missing effect of 2 floors, 54 held the truth (seeds 740161991 and 1528482097).
-LARGEST_RATIO = RULE.at_floor
 
 
 class Side(Enum):
@@ -189,10 +186,15 @@ def inseparable(fit: Fit) -> dict[str, str]:
 
 
 def refusal(fit: Fit) -> NoInterval | None:
-    """Why the fit has no intervals, or None where it has."""
+    """Why the fit has no intervals, or None where it has.
+
+    Above the noise floor what parameters took over of a missing effect, which no residual shows,
+    exceeds their intervals: of 73 given up to twice the floor beside a missing effect of 2 floors,
+    54 held the truth (seeds 740161991 and 1528482097).
+    """
     if len(fit.residual) == 0:
         return AlwaysAtRest()
-    if fit.ratio <= LARGEST_RATIO:
+    if fit.ratio <= RULE.at_floor:
         return None
     return ModelWrong(fit.error, fit.floor, fit.axis.units.force)
 
@@ -257,7 +259,7 @@ def _by_influence(influence: Array, residual: Array) -> float:
     group = np.count_nonzero(size >= edges[:, None], axis=0)
     left = np.maximum(1.0 - np.bincount(group, size**2, groups) / whole, ROUNDING)
     moved = np.bincount(group, influence * residual, groups)
-    return students_t(RULE.chance, groups - 1) * float(np.sqrt((moved**2 / left).sum()))
+    return students_t(BEYOND, groups - 1) * float(np.sqrt((moved**2 / left).sum()))
 
 
 def _held(fit: Fit) -> list[Estimate]:

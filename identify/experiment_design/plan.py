@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from identify.dataset.dataset import Dataset, Role
+from identify.dataset.given_logs import require_moving
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.test_function import require_test_function
@@ -36,7 +37,7 @@ from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.trying import try_effect
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
-from twin.errors import CannotRun, InputError
+from twin.errors import CannotRun
 from twin.experiments.file import in_short
 from twin.experiments.trajectory import require_length
 from twin.logs import GivenLogs, logs_by_name
@@ -213,11 +214,9 @@ def _dataset(
     selection = logs_by_name(holdout, Role.SELECTION.value)
     found = datasets(model, training, selection, test_function)
     name = axis or differing_axis(between, model)
-    if name in found:
-        return found[name]
-    if axis is None:
-        return next(iter(found.values()))
-    raise InputError(f"axis {axis} does not move in the logs; give a log in which it does")
+    if axis is not None:
+        require_moving(axis, found)
+    return found[name] if name in found else next(iter(found.values()))
 
 
 def _arena(

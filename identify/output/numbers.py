@@ -22,6 +22,7 @@ DIGITS = 3  # significant digits of a printed number
 NOTHING = "–"  # printed where there is no value
 RAISED = str.maketrans("+-0123456789", "⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _POWER = re.compile(r"(?<=\d)e([+-])0*(\d+)")
+_MICROMETRES = re.compile(r" um\b")
 _MINUS = re.compile(r"(?<![\w.)])-(?=\d|∞)")
 
 
@@ -177,5 +178,5 @@ def typeset(text: str) -> str:
     def power(found: re.Match[str]) -> str:
         return "×10" + f"{found[1].strip('+')}{found[2]}".translate(RAISED)
 
-    plain = _POWER.sub(power, text.replace("+-", "±").replace(" um", " µm"))
+    plain = _POWER.sub(power, _MICROMETRES.sub(" µm", text.replace("+-", "±")))
     return _MINUS.sub("−", plain.replace(" -> ", " → "))

@@ -10,9 +10,10 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Errors, Fit, finished, fit_axis, fit_roughly
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.estimation.residual_noise import with_own_noise
+from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
-from identify.selection.changes import Added, Screening
+from identify.selection.changes import Added, Screening, control
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
 from identify.selection.search import Found, Step, is_level, search
 from identify.selection.trying import Tried
@@ -241,8 +242,15 @@ def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
 
 def _small(found: Found) -> tuple[str, ...]:
     """Effects that the data show beside what was found, each too small to matter."""
-    if found.final.at_floor:
-        return ()
-    scored = [(t, s) for t in found.last if (s := t.candidate.score) and not t.candidate.doubt]
-    seen = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
-    return tuple(t.change.name for t, s in scored if s.t > seen[0] and s.part > seen[1])
+    least_t, least_part = 3.0, 0.02  # from which a change is real, and worth a word
+    return tuple(
+        t.change.name
+        for t in found.last
+        if not found.final.at_floor
+        and isinstance(t.change, Added)
+        and (s := t.candidate.score)
+        and s.t > least_t
+        and least_part < s.part < RULE.least_part
+        and not t.candidate.doubt
+        and s.part > control(t.change, found.final, t.judged)
+    )

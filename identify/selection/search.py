@@ -73,7 +73,7 @@ class Found:
 
     base: the fit before, at its best. steps: the changes that were accepted and are needed still.
     passed: all that were accepted on the way. final: the fit with the steps. ranking: every absent
-    effect beside the base. small: changes that the data show and that take too little to matter.
+    effect beside the base. last: the changes that were tried beside the final fit.
     """
 
     dataset: Dataset

@@ -19,9 +19,10 @@ from identify.estimation.confounded import linear_bases
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, Outcome, finished
 from identify.estimation.force_balance import residual
-from identify.estimation.intervals import BLOCKS, LARGEST_RATIO, QUANTILE
+from identify.estimation.intervals import BLOCKS, QUANTILE
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.variable_projection import usable
+from identify.rules import RULE
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate
@@ -96,7 +97,7 @@ class AxisAgreement:
     @property
     def of_wrong_models(self) -> bool:
         """Whether a fit's error is more than noise, so that its intervals are scatter alone."""
-        return max(self.above_floor) > LARGEST_RATIO
+        return max(self.above_floor) > RULE.at_floor
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
 def _what_to_do(a: MachineModel, b: MachineModel) -> str:
     """How the machines would come to intervals, as the end of a sentence."""
     above = max((i.above_floor for m in (a, b) for i in m.intervals.values()), default=1.0)
-    if above > LARGEST_RATIO:
+    if above > RULE.at_floor:
         return (
             f"a fit that leaves {above:.3g} times its noise floor has none, as its model is wrong: "
             "find what it lacks with `twin diagnose MODEL LOG...`"

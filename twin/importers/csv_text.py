@@ -161,7 +161,10 @@ def _find_layout(path: Path, stated: ImportMap) -> _Layout:
         lines.pop()
     if not lines:
         raise InputError("has no line of text; give a table of numbers")
-    style = _find_style(lines[-20:], stated)
+    # Of the second half, which is numbers, every so manieth line: the last ones may be of whole
+    # numbers, which have no decimal sign.
+    rows_of_numbers = lines[len(lines) // 2 :]
+    style = _find_style(rows_of_numbers[:: -(-len(rows_of_numbers) // 40)] + lines[-1:], stated)
     rows = [style.cells(line) for line in lines]
     if (scope := _scope_layout(rows, encoding, style)) is not None:
         return scope

@@ -23,7 +23,6 @@ from identify.estimation.evidence import (
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import (
     INSEPARABLE,
-    LARGEST_RATIO,
     ModelWrong,
     estimates,
     half_widths,
@@ -35,6 +34,7 @@ from identify.estimation.intervals import (
 from identify.estimation.least_squares import RIDGE
 from identify.estimation.scaling import Scaling
 from identify.output.words.fit import no_interval_in_words
+from identify.rules import RULE
 from twin.effect import Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read
@@ -200,9 +200,9 @@ def test_what_a_fit_does_not_see_has_no_interval_and_twins_are_named():
 
 def test_a_wrong_model_has_no_intervals():
     axis = AxisModel(1.0)
-    fit = Stub(residual=np.ones(3), ratio=LARGEST_RATIO, error=0.2, floor=0.1, axis=axis)
+    fit = Stub(residual=np.ones(3), ratio=RULE.at_floor, error=0.2, floor=0.1, axis=axis)
     assert refusal(fit) is None
-    fit.ratio = 1.001 * LARGEST_RATIO
+    fit.ratio = 1.001 * RULE.at_floor
     assert "200 mN is 2.0 times the noise floor 100 mN" in no_interval_in_words(refusal(fit))
     fit.residual = np.zeros(0)
     assert "comes to rest within every test function" in no_interval_in_words(refusal(fit))

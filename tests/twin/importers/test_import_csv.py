@@ -67,6 +67,14 @@ def test_the_layout_is_found(tmp_path: Path, text: str | bytes, map_text: str) -
     np.testing.assert_allclose(axis.columns["current"], 1e-3 * table()["i"], rtol=1e-12)
 
 
+def test_a_decimal_comma_is_found_above_a_rest_in_whole_numbers(tmp_path: Path) -> None:
+    moving = [f"{k};{k / 7:.4f};{k / 3:.4f}".replace(".", ",") for k in range(300)]
+    resting = [f"{k};40;90" for k in range(300, 340)]
+    axis = imported(tmp_path, "\n".join(["t;q;i", *moving, *resting])).axes["x"]
+    expected = -1e-3 * (np.arange(300) / 7.0 + 2.0)
+    np.testing.assert_allclose(axis.position[:300], expected, rtol=0, atol=1e-7)
+
+
 def with_row(number: int, row: str) -> str:
     return "\n".join([HEADER, *ROWS[: number - 1], row, *ROWS[number:]])
 
