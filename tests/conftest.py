@@ -35,7 +35,7 @@ LONGEST = (
     "test_search",
     "test_machines",
     "test_report",
-    "test_floor",
+    "test_noise",
 )
 
 

@@ -1,31 +1,16 @@
-"""Machines for tests: stages with drawn values and a planted effect, and their logs."""
+"""The stage, as most tests of the analysis have it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-
-from identify.dataset.preparation import datasets
-from identify.estimation.fit import fit_axis
-from identify.experiment_design.planting import draw_effect, other_machine
-from twin.effects import Catalogue
+from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.logs import Log
-from twin.model.machine import Fitted, MachineModel
+from twin.model.file import load_model
+from twin.model.machine import MachineModel
 from twin.simulator import ReducedSimulator
 
-DURATION = 12.0  # s of each log
-
-
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """A machine, the effect planted on its x axis, and its logs."""
-
-    stage: MachineModel
-    planted: Fitted | None
-    logs: dict[str, Log]
-    holdout: dict[str, Log]
+CATALOGUE = load_catalogue()
+PROTON = load_model("proton_xy", CATALOGUE)
 
 
 def one_axis(stage: MachineModel) -> MachineModel:
@@ -33,31 +18,9 @@ def one_axis(stage: MachineModel) -> MachineModel:
     return MachineModel(stage.name, {"x": stage.axes["x"]}, stage.sample_rate)
 
 
-def machine(
-    stage: MachineModel,
-    catalogue: Catalogue,
-    effect: str | None,
-    force: float,
-    seed: int,
-    duration: float = DURATION,
-) -> Machine:
-    """Draw a machine about the stage, plant an effect of that force (N RMS) on x, and log it."""
-    rng = np.random.default_rng(seed)
-    drawn = stage.with_axis("x", other_machine(stage.axes["x"], rng))
-    planted = None
-    if effect is not None:
-        trial = simulate(
-            drawn, "tracking", seed=seed, duration=duration, simulator=ReducedSimulator
-        )
-        dataset = datasets(drawn, {"trial": trial}, {})["x"]
-        base = fit_axis(drawn.axes["x"], dataset.fit)
-        planted = draw_effect(
-            catalogue[effect], base.axis, dataset.fit, dataset.excitation, force, rng
-        )
-        drawn = drawn.with_axis("x", drawn.axes["x"].with_effect(planted))
-    logs = {
-        f"log {i}": simulate(drawn, "tracking", seed=100 * seed + i, duration=duration)
-        for i in (1, 2, 3)
-    }
-    held = {"log 3": logs.pop("log 3")}
-    return Machine(drawn, planted, logs, held)
+STAGE = one_axis(PROTON)
+
+
+def tracked(machine: MachineModel, seed: int, duration: float, run: str = "tracking") -> Log:
+    """A log of the machine along that experiment, of the reduced model."""
+    return simulate(machine, run, seed=seed, duration=duration, simulator=ReducedSimulator)

@@ -1,4 +1,4 @@
-"""The figures of the benchmarks: targets, files, and no NaN in JSON."""
+"""The figures of the benchmarks: targets, files, and no NaN in JSON; what is counted and timed."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.figures import Figure, Target, write_results
+from benchmarks.size import Code, at
+from benchmarks.stages import STAGES
+from twin.errors import InputError
 
 
 @pytest.mark.parametrize(
@@ -63,3 +66,60 @@ def test_a_figure_that_is_no_number_is_null_in_the_file(tmp_path, value):
     write_results({"first": [Figure("speed", value, target=Target(low=0.0))]}, tmp_path)
     (row,) = strict(tmp_path / "RESULTS.json")["benchmarks"]["first"]
     assert row["value"] is None
+
+
+# What is counted of the code: lines, constants, patches, circles and private functions
+
+
+CODE = Code({
+    "twin/__init__.py": "",
+    "twin/a.py": (
+        "from twin.b import f\n"
+        "LIMIT = 3.0  # m\n"
+        "LOW, HIGH = -1, 2 * 5\n"
+        "# Both ways.\n"
+        "ENDS: tuple[int, ...] = (1, 2)\n"
+        "NAME, SURE = 'x', True\n"
+        "def _g(): ...\n"
+    ),
+    "twin/b.py": (
+        "from typing import TYPE_CHECKING\n"
+        "if TYPE_CHECKING:\n"
+        "    import twin.a\n"
+        "class C:\n"
+        "    def __init__(self): ...\n"
+        "def f(): ...\n"
+    ),
+    "twin/c.py": "from twin import b, a\n",
+    "tests/test_a.py": (
+        "def test(monkeypatch):\n"
+        "    monkeypatch.setattr(a, 'f', 1)\n"
+        "    monkeypatch.chdir('x')\n"
+        "    with patch('a.f'), patch.object(a, 'f'):\n"
+        "        Mock()\n"
+    ),
+})  # fmt: skip
+
+
+def test_code_is_counted() -> None:
+    package = CODE.below("twin")
+    assert package.lines == [0, 7, 6, 1]
+    assert package.constants == [(1, True), (2, False), (1, True)]
+    assert package.circles == 1  # a and b, by a type alone
+    assert package.private_share == pytest.approx(1 / 3)
+    assert (package.patches, CODE.below("tests").patches) == (0, 4)
+
+
+def test_a_revision_that_is_none_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"revision 'no such': git does not know it here \(.*\)"):
+        at("no such")
+
+
+# The stages that the benchmark of a diagnosis times are functions that a diagnosis calls
+
+
+@pytest.mark.parametrize(
+    ("module", "function"), [s[1:] for s in STAGES], ids=[s[0] for s in STAGES]
+)
+def test_exists(module, function):
+    assert callable(getattr(module, function))

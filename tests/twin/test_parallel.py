@@ -1,11 +1,17 @@
-"""Jobs that threads share."""
+"""Jobs that threads share, work in a process of its own, and memory that no thread keeps."""
 
+import ctypes
 import os
+import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
+from twin.errors import InputError
+from twin.isolated import NoAnswer, isolated
 from twin.parallel import cores, parallel, spread
 
 
@@ -103,3 +109,109 @@ def test_as_many_cores_as_the_process_may_use():
     finally:
         os.sched_setaffinity(0, allowed)
     assert cores() == len(allowed)
+
+
+# Work in an isolated process gives its answer, its refusal, or why there is none
+
+
+def doubled(value):
+    return 2 * value
+
+
+def refused(value):
+    raise InputError(f"{value} is refused")
+
+
+def endless():
+    while True:
+        pass
+
+
+def exits(code):
+    os._exit(code)
+
+
+def leaves():
+    raise SystemExit(3)
+
+
+def fails():
+    raise KeyError("damaged\n  table")
+
+
+def not_sent():
+    return lambda: None
+
+
+def hungry(size):
+    return len(bytearray(size))
+
+
+def test_isolated_work_gives_its_answer_its_refusal_or_none():
+    assert isolated(doubled, 21, seconds=20.0) == 42
+    with pytest.raises(InputError, match="7 is refused") as told:
+        isolated(refused, 7, seconds=20.0)
+    assert not isinstance(told.value, NoAnswer)
+    with pytest.raises(NoAnswer, match=r"does not come to an end within 0.2 s"):
+        isolated(endless, seconds=0.2)
+    with pytest.raises(NoAnswer, match="ended the program"):
+        isolated(exits, 0, seconds=20.0)
+    assert isolated(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
+    with pytest.raises(InputError, match="takes more memory"):
+        isolated(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
+
+
+def test_an_error_in_isolated_work_is_told_and_an_exit_as_an_exit():
+    with pytest.raises(NoAnswer, match=r"^failed while it was loaded \(KeyError: .damaged.* table"):
+        isolated(fails, seconds=20.0)
+    with pytest.raises(NoAnswer, match=r"failed while it was loaded .*pickle"):
+        isolated(not_sent, seconds=20.0)
+    with pytest.raises(NoAnswer, match="ended the program while it was loaded; remove the exit"):
+        isolated(leaves, seconds=20.0)
+
+
+# Memory that was freed is everybody's: no thread keeps its own
+
+
+THREADS = 4
+# Heaps of the C library while threads that have taken and freed memory are still there.
+HEAPS = f"""
+import ctypes, sys, threading
+from twin.threads import share_one_arena
+
+if sys.argv[1] == "shared":
+    share_one_arena()
+libc = ctypes.CDLL(None)
+libc.malloc.restype = libc.fopen.restype = ctypes.c_void_p
+ready, asked = threading.Barrier({THREADS + 1}), threading.Event()
+
+def work():
+    libc.free(ctypes.c_void_p(libc.malloc(20_000)))
+    ready.wait()
+    asked.wait()
+
+workers = [threading.Thread(target=work) for _ in range({THREADS})]
+for worker in workers:
+    worker.start()
+ready.wait()
+file = ctypes.c_void_p(libc.fopen(sys.argv[2].encode(), b"w"))
+libc.malloc_info(0, file)
+libc.fclose(file)
+asked.set()
+"""
+
+
+def heaps(how: str, folder: Path) -> int:
+    """Places that a program of several threads takes its memory from."""
+    told = folder / how
+    subprocess.run([sys.executable, "-c", HEAPS, how, str(told)], check=True)
+    return told.read_text().count("<heap nr=")
+
+
+@pytest.mark.skipif(
+    not hasattr(ctypes.CDLL(None) if sys.platform == "linux" else None, "malloc_info"),
+    reason="only glibc tells where its memory is",
+)
+def test_threads_take_their_memory_from_one_place(tmp_path: Path) -> None:
+    assert heaps("shared", tmp_path) == 1
+    assert heaps("apart", tmp_path) > 1

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE, HARDWARE, PLAIN, fitted
+from built_fits import HARDWARE, PLAIN, fitted
+from machines import CATALOGUE
 
 from benchmarks.selftest.design import (
     DEVELOPMENT,

@@ -7,20 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE
+from machines import CATALOGUE
+from machines import PROTON as STAGE
 
 from benchmarks.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
 from benchmarks.selftest.variations import DAMPING, VARIATIONS, Drawn, drawn_values
 from twin.effect import OUT, Effect, Excitation, Kind
 from twin.excitation import Repeating
 from twin.laws.trials import Array, Motion, trace
-from twin.model.file import load_model
 
 Values = dict[str, float]
 EFFECTS = {e.name: e for e in (*BUMPS, *CABLES, NOISE, *OUTSIDE.values())}
 MOTION = Motion.random(np.random.default_rng(5), samples=300, dt=0.037)
 SEEN = Excitation(-0.15, 0.15, 0.2, 0.3, 12.0, 1e-3, repeats=Repeating((7.0,), (0.02,)))
-STAGE = load_model("proton_xy", CATALOGUE)
 T = MOTION.dt * np.arange(len(MOTION))
 
 

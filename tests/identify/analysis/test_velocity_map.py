@@ -1,4 +1,4 @@
-"""Friction from logs: maps over velocity, the curve through them, the stiffness of bristles."""
+"""Friction and the force of the cable from logs, without a fit of the model."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from built_fits import axis_of, fitted
+from machines import CATALOGUE, tracked
+from machines import PROTON as STAGE
 from scipy.special import stdtrit
 
 import identify
+from identify.analysis.cable_force import CableForce, Passes, Spike, find_spikes, pitch_of
 from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free
 from identify.analysis.friction_curve import (
     LINE,
@@ -25,6 +28,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from twin.effects import load_catalogue
 from twin.errors import InputError
+from twin.experiments import kinds
 from twin.experiments.kinds import OpenLoopSine, Reversals, Staircase
 from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
@@ -35,9 +39,7 @@ from twin.model.parameters import free_parameters
 from twin.simulator import FineSimulator, ReducedSimulator
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-CATALOGUE = load_catalogue()
 LOCAL = Fitted.at_start(CATALOGUE["position_dependent_friction"], {"c1": 0.06})
-STAGE = load_model("proton_xy", CATALOGUE)
 ONE = MachineModel("slide", {"x": STAGE.axes["x"].with_effect(LOCAL)}, 1000.0)
 SLIDE = MachineModel("slide", {"x": STAGE.axes["x"]}, 2000.0)
 CURVE = StribeckCurve(0.285, 0.335, 0.01, 0.018)
@@ -80,7 +82,7 @@ def test_a_map_has_a_curve_each_way_and_the_mean_of_both(logs) -> None:
 def test_the_axis_must_be_one_that_moves_and_at_constant_speed(logs) -> None:
     with pytest.raises(InputError, match="axis z does not move in the logs; there moves x"):
         identify.friction_map(ONE, logs, axis="z")
-    both = simulate(STAGE, "tracking", seed=1, duration=2.0, simulator=ReducedSimulator)
+    both = tracked(STAGE, 1, 2.0)
     assert len(datasets(STAGE, {"run": both}, {})) == 2
     with pytest.raises(InputError, match="x, y move in the logs; give the axis"):
         identify.velocity_map(STAGE, {"run": both})
@@ -196,3 +198,72 @@ def test_both_are_found_from_a_sine_below_the_break_away() -> None:
     assert values["sigma1"] == pytest.approx(0.6, rel=2e-2)
     assert values["Fc"] == 0.285
     assert found.error < 1e-7
+
+
+# The force of the cable from passes, and the spikes that are kept out of it
+
+
+STAGE = load_model("proton_xy", load_catalogue())
+ALONE = MachineModel("slide", {"x": STAGE.axes["x"]}, STAGE.sample_rate)
+PLACE = np.linspace(-0.14, 0.14, 600)
+CABLE = -(0.05 + 1.5 * PLACE - 2.0 * PLACE**2)
+
+
+def made(ahead: float, behind: float, rng: np.random.Generator, pitch: float = 0.03) -> Passes:
+    """Five passes each way with friction, a cable and bumps that brake by that much (N)."""
+    apart = (PLACE - 0.004 + 0.5 * pitch) % pitch - 0.5 * pitch
+    bump = np.maximum(1.0 - (apart / 0.002) ** 2, 0.0) ** 2
+    noise = 1e-3 * rng.standard_normal((2, 5, len(PLACE)))
+    return Passes(
+        PLACE, 0.3 - CABLE + ahead * bump + noise[0], -0.3 - CABLE - behind * bump + noise[1]
+    )
+
+
+@pytest.mark.parametrize(("ahead", "behind"), [(0.06, -0.06), (-0.05, 0.02)])
+def test_spikes_are_found_whichever_way_they_push(ahead: float, behind: float) -> None:
+    spikes = find_spikes(made(ahead, behind, np.random.default_rng(1)))
+    found = pitch_of(spikes)
+    assert len(spikes) == 9
+    assert found is not None
+    assert found.value == pytest.approx(0.03, abs=2e-5)
+    assert abs(found.value - 0.03) < 4.0 * found.standard_error
+    assert np.mean([s.ahead for s in spikes]) == pytest.approx(ahead, abs=5e-3)
+
+
+def test_a_track_without_spikes_has_none_and_one_not_found_leaves_the_pitch_as_it_is() -> None:
+    assert find_spikes(made(0.0, 0.0, np.random.default_rng(2))) == ()
+    assert pitch_of(()) is None
+    places = np.array([0.0, 1.0, 2.0, 4.0, 5.0]) * 0.03
+    found = pitch_of(tuple(Spike(p, 0.004, 0.05, 0.05) for p in places))
+    assert found is not None
+    assert found.value == pytest.approx(0.03)
+
+
+def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth() -> None:
+    """Where the grid begins 2.2 mm before a bump of 4 mm, nothing is known before the bump."""
+    whole = made(0.05, 0.05, np.random.default_rng(3))
+    first = int(np.searchsorted(PLACE, 0.004 - 0.12 - 0.0022))
+    begun = whole.part(slice(first, None))
+    found = CableForce.of(begun)
+    assert found.spikes[0].centre == pytest.approx(0.004 - 0.12, abs=2e-4)
+    assert found.position[0] > found.spikes[0].centre + 0.002
+    assert found.position[-1] == PLACE[-1]
+    assert found.kept[0]
+    true = np.interp(found.position, PLACE, CABLE)
+    assert found.force == pytest.approx(true, abs=2e-3)
+    assert 0.75 < np.mean(np.abs(found.force - true) < found.band) < 0.99
+
+
+def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
+    passes = kinds.Passes("x", span=0.3, speed=0.1, repeats=2)
+    log = simulate(STAGE, passes, seed=1, simulator=ReducedSimulator)
+    found = identify.cable_force(STAGE, {"passes": log}, axis="x")
+    assert found.pitch is not None
+    assert found.pitch.value == pytest.approx(0.034, abs=1e-4)
+    log = tracked(ALONE, 1, 3.0)
+    with pytest.raises(InputError, match="two each way"):
+        identify.cable_force(ALONE, {"log": log})
+    apart = {f"{at}": simulate(ALONE, kinds.Staircase("x", speeds=(0.06,) * 2, span=0.01, at=(at,)),
+                               simulator=ReducedSimulator) for at in (0.102, -0.102)}  # fmt: skip
+    with pytest.raises(InputError, match="no stretch of the track in common"):
+        identify.cable_force(ALONE, apart)

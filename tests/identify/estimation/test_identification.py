@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from check_drive import drive
 from emps_published import direction_dependent, identify, load, prediction_error, symmetric
-from machines import one_axis
+from machines import CATALOGUE, one_axis, tracked
+from machines import PROTON as NOMINAL
 
 from identify import workflow
 from identify.dataset.preparation import datasets
-from identify.estimation.fit import Outcome, finished, fit_axis
-from identify.estimation.force_balance import residual
+from identify.estimation.fit import Outcome, finished
 from identify.estimation.intervals import OpenSided, Side, estimates
 from identify.output.as_json import json_of
 from identify.output.words.fit import refit_in_words
@@ -24,63 +24,20 @@ from identify.validation.agreement import agreement
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.logs.log import Array
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.model.parameters import free_parameters, read, write
-from twin.simulator import ReducedSimulator
+from twin.model.parameters import free_parameters, write
 
-CATALOGUE = load_catalogue()
-NOMINAL = load_model("proton_xy", CATALOGUE)
 STAGE = one_axis(NOMINAL)
 AXIS = STAGE.axes["x"]
 
 
 @pytest.fixture(scope="module")
 def dataset():
-    logs = {
-        f"log {s}": simulate(STAGE, "tracking", seed=s, duration=15.0, simulator=ReducedSimulator)
-        for s in (1, 2)
-    }
+    logs = {f"log {s}": tracked(STAGE, s, 15.0) for s in (1, 2)}
     return datasets(STAGE, logs, {})["x"]
-
-
-@pytest.fixture(scope="module")
-def fitted(dataset):
-    return fit_axis(AXIS, dataset.fit)
-
-
-def test_every_parameter_is_found_from_a_start_half_off(dataset):
-    where = free_parameters(AXIS)
-    truth = read(AXIS, where)
-    off = [c.parameter.name != "phase" for c in where]
-    found = fit_axis(write(AXIS, where, np.where(off, 0.5 * truth, truth)), dataset.fit)
-    assert found.ratio < 1.2
-    for c, value, true in zip(where, read(found.axis, where), truth, strict=True):
-        loose = 0.15 if c.label in ("lugre.sigma1", "lugre.sigma2") else 0.05
-        assert value == pytest.approx(true, rel=loose), c.label
-
-
-def test_most_intervals_cover_the_truth_and_are_narrow(fitted):
-    truth = dict(
-        zip(
-            (c.label for c in free_parameters(AXIS)), read(AXIS, free_parameters(AXIS)), strict=True
-        )
-    )
-    free = [e for e in estimates(fitted) if e.free]
-    covered = [e.low <= truth[e.label] <= e.high for e in free if e.low is not None]
-    assert len(covered) == len(free)
-    # Of ten intervals of 90 % six or fewer hold the truth in 1 of 80 cases, of more less often.
-    assert len(covered) >= 10
-    assert np.mean(covered) > 0.6
-    mass = next(e for e in free if e.label == "mass")
-    heavier = replace(fitted.axis, mass=fitted.axis.mass + 1.0)
-    slope = (residual(heavier, fitted.logs) - residual(fitted.axis, fitted.logs))[fitted.kept]
-    alone = 2.0 * 1.645 * fitted.floor / np.linalg.norm(slope)  # width, were all else known
-    # What else is fitted, and the colour that overlapping windows give the noise, widen it.
-    assert alone < mass.high - mass.low < 5.0 * alone
 
 
 def test_a_value_that_fits_as_well_farther_off_has_no_interval():
@@ -89,7 +46,7 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     stops = {"low": lowest, "high": highest, "stiffness": 2.0}
     effect = CATALOGUE["end_stop"]
     there = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(effect, stops)))
-    log = simulate(there, "tracking", seed=3, duration=10.0, simulator=ReducedSimulator)
+    log = tracked(there, 3, 10.0)
     dataset = datasets(STAGE, {"log": log}, {})["x"]
     touching = float(dataset.fit[0].motion.position.min()) + 1e-4
     begun = AXIS.with_effect(Fitted.at_start(effect, {**stops, "low": touching}))
@@ -104,10 +61,7 @@ def test_a_users_effect_is_fitted_and_named():
     own = load_catalogue([Path(__file__).parents[3] / "examples" / "my_effect.py"])
     true = {"k": 9.0, "place": 0.043, "w": 0.018}
     stage = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(own["my_effect"], true)))
-    logs = {
-        f"log {s}": simulate(stage, "moves", seed=s, duration=8.0, simulator=ReducedSimulator)
-        for s in (1, 2)
-    }
+    logs = {f"log {s}": tracked(stage, s, 8.0, "moves") for s in (1, 2)}
     held = {"log 2": logs.pop("log 2")}
     rivals = ("asymmetric_friction", "position_dependent_friction")
     few = Catalogue([own["my_effect"], *(own[name] for name in rivals)])
@@ -132,7 +86,7 @@ def stage_with(label: str, value: float) -> MachineModel:
 @cache
 def logged(label: str, value: float) -> Log:
     stage = stage_with(label, value)
-    return simulate(stage, "moves", seed=1, duration=6.0, simulator=ReducedSimulator)
+    return tracked(stage, 1, 6.0, "moves")
 
 
 @cache

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from built_fits import HARDWARE, axis_of, fitted
 from constructed import (
-    CATALOGUE,
     LAG,
     PAYLOAD,
     RIPPLE,
@@ -21,6 +20,7 @@ from constructed import (
     waves,
     windowed,
 )
+from machines import CATALOGUE
 
 from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, scale_of, sticks
@@ -38,7 +38,6 @@ from twin.laws.trials import legal
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import free_parameters, read, write
 
-H = np.array([[-1e-4], [0.0], [1e-4]])  # s
 LOGS = [windowed(SHORT)]
 FREE = [e for e in CATALOGUE.values() if any(not p.fixed for p in e.parameters)]
 
@@ -125,32 +124,6 @@ def test_the_residual_of_an_exactly_integrated_motion_is_zero():
     np.testing.assert_allclose(left, -0.2 / 1.7 * log.command, atol=1e-7)
     pushed = AxisModel(1.7, effects=(effect("constant_force", {"F0": 0.37}),))
     np.testing.assert_allclose(residual(pushed, [log]), 0.37, rtol=1e-6)
-
-
-def test_forces_of_known_form_are_taken_away_by_their_effects():
-    """A cable, a drag and a pump move a mass beside the command: command + they = mass x a."""
-    rate, mass, clock = 4000.0, 1.3, 0.057
-    x = waves((0.03, 2.3, 0.4), (0.004, 7.1, 1.0))
-    t = (np.arange(round(1.2 * rate)) + 0.5) / rate
-    speed, acceleration = (
-        (x(t + 1e-4) - x(t - 1e-4)) / 2e-4,
-        np.diff(x(t + H), 2, axis=0)[0] / 1e-8,
-    )
-    cable, drag = -12.0 * x(t) - 0.2, -0.9 * speed * np.abs(speed)
-    pump = 0.4 * np.sin(2.0 * np.pi * 11.0 * (t + clock))
-    motion = motion_of(
-        log_of(rate, x(t - 0.5 / rate), mass * acceleration - cable - drag - pump), "x", ""
-    )
-    log = windowed(replace(motion, time_origin=clock))
-    effects = (
-        effect("cable_slab", {"k1": 12.0, "offset": 0.2}),
-        effect("quadratic_drag", {"c": 0.9}),
-        effect("periodic_disturbance", {"f": 11.0, "a": 0.4}),
-    )
-    assert np.abs(residual(AxisModel(mass, effects=effects), [log])).max() < 2e-3
-    for k in range(3):
-        rest = AxisModel(mass, effects=effects[:k] + effects[k + 1 :])
-        assert np.abs(residual(rest, [log])).max() > 0.05
 
 
 def test_windows_with_standstill_are_left_out_for_a_friction_that_sticks_alone():

@@ -7,12 +7,12 @@ larger. Time has one unit.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from constructed import CATALOGUE, Array, log_of, waves
+from constructed import Array, log_of, waves
+from machines import CATALOGUE
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
@@ -111,25 +111,6 @@ def test_a_fit_is_the_same_in_other_units(effect: Effect) -> None:
     units = [(1.0 if effect.name in TURNING else u[0], u[1]) for u in UNITS]  # a radian is one
     found = {u: differing(effect, *u) for u in units}
     assert not any(found.values()), found
-
-
-def with_one(name: str, parameter: str, **changed: object) -> Effect:
-    effect = CATALOGUE[name]
-    own = tuple(replace(p, **changed) if p.name == parameter else p for p in effect.parameters)
-    return replace(effect, parameters=own)
-
-
-FAULTS = {
-    "bound": lambda: with_one("load_dependent_friction", "offset", lower=-1.0, upper=1.0),
-    "scan": lambda: with_one("cable_hysteresis", "reach", scan=lambda e: (3e-3, 6e-3)),
-    "start": lambda: with_one("end_stop", "high", scan=None, start_rule=lambda e: 0.09),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_an_absolute_size_is_seen(fault: str) -> None:
-    effect = FAULTS[fault]()
-    assert any(differing(effect, *units) for units in UNITS)
 
 
 def test_a_curve_over_speed_is_sought_where_the_motion_is() -> None:

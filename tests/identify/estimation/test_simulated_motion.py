@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_runs import twin
+from machines import CATALOGUE
 
 import identify
 from identify.dataset.preparation import datasets
@@ -17,7 +18,6 @@ from identify.estimation.fit import Outcome
 from identify.estimation.open_loop import measured_beginning, simulated_error
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion, rough_minimum
 from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
-from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
 from twin.experiments.named import simulate
@@ -28,7 +28,6 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import free_parameters, read, write
 from twin.simulator import ReducedSimulator
 
-CATALOGUE = load_catalogue()
 EXAMPLES = Path(__file__).parents[3] / "examples"
 RATE = 1000.0
 NOISE = 1e-7  # m

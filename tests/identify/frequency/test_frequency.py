@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from scipy.signal import butter, csd, lfilter
+from scipy.signal import butter, lfilter
 
 import identify
-from benchmarks.second_simulator.two_masses import CELLS, TwoMasses, multisine, wandering
+from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
 from identify.frequency.plant import Banded, loop_of, plant_of
 from identify.frequency.response import Record, response
 from identify.output.as_json import answer_of
@@ -70,23 +70,6 @@ def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_n
     true = noisy.response(with_it.frequency)[near]
     error = [abs(np.mean(r.plant[near] / true - 1.0)) for r in (with_it, without)]
     assert 4.0 * error[0] < error[1]
-
-
-def test_the_ratio_of_spectra_by_scipy_is_the_same_over_whole_periods() -> None:
-    record = recorded(multisine)
-    found = response([record])
-
-    def of_setpoint(signal: Array) -> Array:
-        wanted, other = record.setpoint[CELLS:], signal[CELLS:]  # after the first period, at rest
-        return csd(wanted, other, 1.0 / record.period, "boxcar", CELLS, 0, detrend=False)[1]
-
-    near = found.tells & (found.frequency < 60.0)  # above, noise of the single lines is more
-    at = np.rint(found.frequency[near] * CELLS * record.period).astype(int)
-    other = of_setpoint(record.position)[at] / of_setpoint(record.force)[at]
-    apart = np.abs(other / found.plant[near] - 1.0)
-    assert near.sum() > 50
-    assert np.median(apart) < 0.01
-    assert np.quantile(apart, 0.9) < 0.05
 
 
 def test_noise_and_what_is_not_linear_are_told_apart() -> None:

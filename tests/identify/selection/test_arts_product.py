@@ -7,19 +7,18 @@ import time
 
 import numpy as np
 import pytest
+from machines import CATALOGUE
 from scipy.optimize import least_squares
 
 from identify.dataset.dataset import Role
 from identify.estimation.fit import error_in
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
-from twin.effects import load_catalogue
 from twin.importers import import_log, load_mapping
 from twin.model.file import load_model
 
 pytestmark = pytest.mark.slow
 
-CATALOGUE = load_catalogue()
 TRAINING, TEST = ("0.25Hz", "0.5Hz"), "1Hz"
 HYSTERETIC = {
     "dahl", "lugre", "leuven", "modified_leuven", "gms", "cable_hysteresis",

@@ -10,17 +10,17 @@ import emps_published
 import numpy as np
 import pytest
 from emps_published import direction_dependent, identify, prediction_error, symmetric
+from machines import CATALOGUE
 
 from identify.output.words.diagnosis import remarks_on
 from identify.selection.diagnosis import Verdict
 from identify.workflow import add, diagnose
-from twin.effects import Catalogue, load_catalogue
+from twin.effects import Catalogue
 from twin.importers import import_log, load_mapping
 from twin.logs import read_log, write_log
 from twin.model.file import load_model
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-CATALOGUE = load_catalogue()
 WINDOW = 0.2  # s
 
 

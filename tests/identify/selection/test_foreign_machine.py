@@ -1,148 +1,116 @@
-"""Logs of a second simulator, which shares no law with the product: the right name, or none."""
+"""Logs of other simulators, which share no law with the product: the right name, or none.
 
-from dataclasses import replace
+The second simulator and its drives are those of benchmarks/, which judge all effects.
+"""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
 
+import identify
+from benchmarks.drives import row
 from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
-from benchmarks.second_simulator.effects import INSIDE, OUTSIDE
-from benchmarks.second_simulator.kernel import AHEAD, BEHIND, FORCE, SLIP_ELEMENTS
-from benchmarks.second_simulator.machine import PLACE, drawn, gaussian, logs_of, run
-from identify import workflow
-from identify.selection.diagnosis import Verdict
-from twin.curve import Coordinate
+from benchmarks.second_simulator.drives import Recorder
+from benchmarks.second_simulator.effects import INSIDE
+from benchmarks.second_simulator.machine import drawn
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue
-from twin.model.machine import Fitted
+from twin.logs import AxisLog, Log
 
-SEED = 5
 RATE = 4e3  # Hz
-RIVALS = Catalogue(
-    CATALOGUE[name]
-    for name in (
-        "actuator_delay", "asymmetric_friction", "base_vibration", "cable_hysteresis", "cogging",
-        "load_dependent_friction", "periodic_disturbance", "quadratic_drag", "thermal_drift",
-        "wear",
-    )
-)  # fmt: skip
 FEW = Catalogue([CATALOGUE[n] for n in ("asymmetric_friction", "cogging", "quadratic_drag")])
-QUICK = (6.0, FEW)  # s of each log, and the effects tried
-FULL = (10.0, CATALOGUE)
 
 
-def found(planted, size, terms, seed=SEED):
-    """The diagnosis of a machine with that effect."""
-    base = drawn(np.random.default_rng(seed), RATE)
-    machine = planted.make(base, size, np.random.default_rng(seed))
-    return diagnosed(model_for(planted), machine, seed, *terms)
-
-
-NAMED = [("cogging", 0.01)]
-SLOWLY_NAMED = [
-    *NAMED, ("thermal_drift", 0.2),
-    ("quadratic_drag", 0.05), ("position_dependent_friction (slope)", 0.2),
-    ("asymmetric_friction", 0.1), ("cable_hysteresis", 0.1), ("force_constant_ripple", 0.01),
-    ("roller_spikes", 0.05),
-]  # fmt: skip
-OTHER = [("saturating drag", 0.1), ("random walk", 0.03), ("chirp", 0.03), ("growing mass", 0.03)]
-
-
-def cases(quick, slow):
-    """Quick cases, and the slow ones, which meet the whole catalogue."""
-    return [
-        *(pytest.param(*case, QUICK) for case in quick),
-        *(pytest.param(*case, FULL, marks=pytest.mark.slow) for case in slow),
-    ]
-
-
-@pytest.mark.parametrize(("effect", "size", "terms"), cases(NAMED, SLOWLY_NAMED))
-def test_an_effect_of_the_catalogue_is_named_whatever_its_form(effect, size, terms):
-    answer = found(INSIDE[effect], size, terms)
+def test_an_effect_of_the_catalogue_is_named() -> None:
+    planted, rng = INSIDE["cogging"], np.random.default_rng(5)
+    machine = planted.make(drawn(np.random.default_rng(5), RATE), 0.01, rng)
+    answer = diagnosed(model_for(planted), machine, 5, 6.0, FEW)
     assert answer.best is not None
-    assert answer.best.effect.name in INSIDE[effect].right
+    assert answer.best.effect.name in planted.right
 
 
-@pytest.mark.parametrize(("effect", "size", "terms"), cases([], OTHER))
-def test_an_effect_of_no_catalogue_is_not_given_a_name(effect, size, terms):
-    answer = found(OUTSIDE[effect], size, terms)
-    assert answer.best is None
-    # What nothing measured foretells, as a random walk, is told as noise of that size; a drag that
-    # levels off is another curve of the friction over speed.
-    if answer.findings:
-        (finding,) = answer.findings
-        assert (effect, finding.effect) == ("saturating drag", "lugre")
-        assert finding.shape is not None
-        assert finding.shape.over is Coordinate.SPEED
-    else:
-        assert answer.verdict is Verdict.UNEXPLAINED or answer.dataset.force_noise > 0.0
+def test_nothing_is_named_where_nothing_is_planted() -> None:
+    machine = drawn(np.random.default_rng(1), RATE)
+    assert diagnosed(STAGE, machine, 1, 6.0, FEW).verdict is Verdict.NOTHING_MISSING
 
 
-@pytest.mark.parametrize(
-    ("seed", "rate", "terms"),
-    cases([(1, RATE)], [(s, r) for s in (2, 3, 4) for r in (1e3, 4e3, 10e3)]),
-)
-def test_nothing_is_named_where_nothing_is_planted(seed, rate, terms):
-    machine = drawn(np.random.default_rng(seed), rate)
-    assert diagnosed(STAGE, machine, seed, *terms).verdict is Verdict.NOTHING_MISSING
+@pytest.mark.parametrize("hidden", ["nothing", pytest.param("ripple", marks=pytest.mark.slow)])
+def test_noise_of_the_force_is_no_friction_that_grows_with_it(hidden: str) -> None:
+    """A servo of 1 kHz logged at 200 Hz: what thinning folds into its force is half of it."""
+    found = row("servo", hidden, Recorder(200, 1000), 1)
+    assert not [f for f in found["findings"] if f["mark"] == "wrong"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_bumps_of_another_form_are_no_reason_to_name_another_effect(seed):
-    machine = drawn(np.random.default_rng(seed), bump=gaussian)
-    assert diagnosed(STAGE, machine, seed).best is None
+# A drive as many are: dry friction that sticks at each turn, and an encoder of a micrometre
+
+SAMPLED, SECONDS, SUB = 1000, 10.0, 10
+MASS, COULOMB, VISCOUS = 12.0, 9.0, 25.0  # kg, N, N s/m
+PITCH, HEIGHT = 0.020, 2.5  # m, N
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_bumps_that_let_go_at_rest_are_told_as_bumps_of_another_shape(seed):
-    machine = drawn(np.random.default_rng(seed), RATE, bump=gaussian).having(turn=0.0)
-    answer = diagnosed(STAGE, machine, seed)
-    assert answer.best is None
-    if not answer.base.at_floor:
-        assert answer.verdict is Verdict.WRONG_SHAPE
-        assert [f.effect for f in answer.findings] == ["roller_spikes"]
+def setpoint(rng: np.random.Generator) -> np.ndarray:
+    """Moves of minimum jerk from place to place without a rest, m."""
+    parts, at, count = [], 0.15, round(SECONDS * SAMPLED)
+    while sum(map(len, parts)) < count:
+        to, speed, steep = rng.uniform(0.02, 0.48), rng.uniform(0.05, 0.4), rng.uniform(1.0, 4.0)
+        way = abs(to - at)
+        lasts = max(1.875 * way / speed, np.sqrt(5.77 * way / steep), 0.05)
+        s = np.linspace(0.0, 1.0, round(lasts * SAMPLED))[1:]
+        parts.append(at + (to - at) * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5))
+        at = to
+    return np.concatenate(parts)[:count]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [200, 203])  # 204 is unexplained
-def test_friction_that_varies_along_the_track_differently_each_way_is_told(seed):
-    """And with those curves the error on a log that chose nothing falls.
-
-    The mean of both directions is a force of position, which a cable slab can be as well.
-    """
+def recorded(seed: int, step: float, height: float) -> Log:
+    """A PID loop at the log's rate; friction holds the mass until the force exceeds it."""
     rng = np.random.default_rng(seed)
-    machine = drawn(rng, 2e3)
-    for row, place in zip((AHEAD, BEHIND), rng.uniform(-0.1, 0.1, 2), strict=True):
-        machine = machine.plus(row, 0.03 * gaussian(PLACE - place, 0.05))
-    answer = diagnosed(STAGE, machine, seed)
-    assert answer.verdict is Verdict.WRONG_SHAPE
-    assert {f.effect for f in answer.findings} == {"lugre", "cable_slab"}
-    (friction,) = (f for f in answer.findings if f.effect == "lugre")
-    assert friction.shape is not None
-    assert set(friction.shape.curves) == {"forwards", "backwards"}
-
-    logs, held = logs_of(machine, seed, 10.0)
-    better = workflow.fit(STAGE, logs).model
-    without = better
-    for finding in answer.findings:
-        better = workflow.add_shape(CATALOGUE[finding.effect], better, logs, held).model
-    before, after = (
-        workflow.compare(m, {"test": run(machine, 77_000 + seed, 10.0)}).axes["x"].total_error
-        for m in (without, better)
+    wanted = setpoint(rng)
+    speed = np.gradient(wanted, 1.0 / SAMPLED)
+    ahead = MASS * np.gradient(speed, 1.0 / SAMPLED) + COULOMB * np.tanh(speed / 0.01)
+    reading, force = np.zeros((2, len(wanted)))
+    seen, pushed = (
+        0.3e-6 * rng.standard_normal(len(wanted)),
+        0.02 * rng.standard_normal(len(wanted)),
     )
-    assert after < 0.6 * before
+    x, v, total, dt = float(wanted[0]), 0.0, 0.0, 1.0 / SAMPLED / SUB
+    for k in range(len(wanted)):
+        reading[k] = np.round((x + seen[k]) / step) * step
+        error = wanted[k] - reading[k]
+        rate = speed[k] - (reading[k] - reading[k - 1]) * SAMPLED if k else 0.0
+        total += error / SAMPLED
+        force[k] = ahead[k] + 6e4 * error + 1200.0 * rate + 4e5 * total
+        for _ in range(SUB):
+            pull = force[k] + pushed[k] - VISCOUS * v + height * np.sin(2.0 * np.pi * x / PITCH)
+            free = v + pull / MASS * dt
+            held = COULOMB / MASS * dt
+            before, v = v, (free - held if free > held else free + held if free < -held else 0.0)
+            x += 0.5 * (before + v) * dt
+    return Log(SAMPLED, {"x": AxisLog({"position": reading, "force": force})})
 
 
-@pytest.mark.slow
-def test_a_hysteresis_that_leaves_no_dry_friction_may_be_one():
-    """Slip elements of the friction are to the motion what those of a cable would be."""
-    machine = drawn(np.random.default_rng(1), 2e3)
-    machine.tables[[FORCE, AHEAD, BEHIND]] = 0.0
-    machine = machine.having(kind=SLIP_ELEMENTS, Fc=1.1, Fs=1.1, s2=1.1)
-    axis = STAGE.axes["x"]
-    friction = Fitted.at_start(CATALOGUE["coulomb_viscous"])
-    model = STAGE.with_axis("x", replace(axis, effects=(friction,)))
-    tried = Catalogue([*RIVALS.values(), CATALOGUE["gms"], CATALOGUE["stribeck"]])
-    answer = diagnosed(model, machine, 1, 8.0, tried)
-    assert "gms" in answer.answers[0]
+def found(step: float, height: float = 0.0) -> AxisDiagnosis:
+    logs = {str(seed): recorded(seed, step, height) for seed in (1, 2, 3)}
+    held = {"3": logs.pop("3")}
+    return identify.diagnose(identify.first_model(logs), logs, held).axes["x"]
+
+
+@pytest.mark.parametrize("step", [1e-6, pytest.param(1e-8, marks=pytest.mark.slow)])
+def test_nothing_is_missing(step: float) -> None:
+    """Noise of the readings is as fast as what sticks for some milliseconds and is at rest."""
+    answer = found(step)
+    assert answer.verdict is Verdict.NOTHING_MISSING
+    assert answer.base.ratio < 1.15
+    values = answer.base.axis["coulomb_viscous"].values
+    assert answer.base.axis.mass == pytest.approx(MASS, rel=2e-3)
+    assert values["Fc"] == pytest.approx(COULOMB, rel=5e-3)
+    assert values["sigma2"] == pytest.approx(VISCOUS, rel=1e-2)
+
+
+def test_cogging_is_named_and_nothing_beside_it() -> None:
+    answer = found(1e-6, HEIGHT)
+    assert answer.named == ("cogging",)
+
+    values = answer.final.axis["cogging"].values
+    assert values["p"] == pytest.approx(PITCH, rel=1e-3)
+    assert answer.final.at_floor

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from machines import CATALOGUE
 
 from identify.estimation.evidence import rms
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.workflow import diagnose, fit
-from twin.effects import Catalogue, load_catalogue
+from twin.effects import Catalogue
 from twin.importers import import_log, load_mapping
 from twin.model.file import load_model
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-CATALOGUE = load_catalogue()
 # What else could repeat, and what a motor may have.
 RIVALS = Catalogue(
     CATALOGUE[n]

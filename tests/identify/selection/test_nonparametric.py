@@ -1,42 +1,48 @@
-"""What no physical effect explains: described by a map or a learned model, where held-out logs ask.
+"""What no physical effect explains: a map or a learned model, its linear algebra and its choice."""
 
-The forces planted here are in no catalogue; the descriptions are found by their marker.
-"""
+from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
+from math import sin
 from pathlib import Path
 
 import numpy as np
 import pytest
-from machines import one_axis
-from unexplained_effects import foreign
+from built_fits import PLAIN, axis_of, built_dataset, built_machine, fitted
+from machines import CATALOGUE, PROTON, one_axis, tracked
 
 from identify.dataset.prepared_log import on_blocks, total_force
-from identify.estimation.fit import fit_axis
+from identify.estimation.evidence import BLOCKS, effective_samples
+from identify.estimation.fit import Outcome, finished, fit_axis
+from identify.estimation.force_balance import jacobian
+from identify.estimation.least_squares import RIDGE, ROUNDING, solve
+from identify.estimation.splines import STIFFNESS, Linearised, choose_stiffness
 from identify.estimation.variable_projection import absent_effects
+from identify.output.words.fit import nonparametric_in_words
 from identify.results.results import Addition, FitResult
-from identify.selection.nonparametric import fit_nonparametric
+from identify.selection.nonparametric import (
+    _filled,
+    fit_nonparametric,
+    nonparametric_labels,
+    physics_alone,
+)
 from identify.workflow import add, fit
-from twin.effect import Effect
-from twin.effects import load_catalogue
-from twin.experiments.named import simulate
-from twin.laws.trials import Motion, forces
+from twin.effect import OUT, Effect, Kind, Parameter, X
 from twin.logs import Log
-from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.model.parameters import ParameterReference
 
-CATALOGUE = load_catalogue()
 RATE = 2500.0  # Hz: quicker than 10 kHz, and enough for curves over the travel
-STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=RATE)
+STAGE = replace(one_axis(PROTON), sample_rate=RATE)
 QUICK = replace(STAGE, sample_rate=1000.0)
 MAP, LEARNED = "empirical_map", "learned_residual"
 SLOW = pytest.mark.slow
 DESCRIPTIONS = pytest.mark.parametrize("name", [MAP, LEARNED])
 Logs = dict[str, Log]
 SHORT = 6.0  # s of a log that is enough for most
-CHIRP = 0.05  # N, its height
+HEIGHT = 0.05  # N, of the chirp
 
 
 def with_x(effect: Effect, **values: float) -> MachineModel:
@@ -45,12 +51,7 @@ def with_x(effect: Effect, **values: float) -> MachineModel:
 
 
 def recorded(machine: MachineModel, seeds: tuple[int, ...], duration: float = 20.0) -> Logs:
-    return {
-        f"log {s}": simulate(
-            machine, "tracking", seed=s, duration=duration, simulator=ReducedSimulator
-        )
-        for s in seeds
-    }
+    return {f"log {s}": tracked(machine, s, duration) for s in seeds}
 
 
 def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
@@ -62,15 +63,22 @@ def test_descriptions_are_marked_and_never_a_diagnosis() -> None:
         assert "not a physical law" in CATALOGUE[name].summary
 
 
-@pytest.fixture(scope="module")
-def chirp(tmp_path_factory: pytest.TempPathFactory) -> Effect:
-    return foreign("chirp", tmp_path_factory.mktemp("chirp"))
+def chirp_law(p, s, io):
+    place = io[X] + 0.15
+    io[OUT] = p[0] * sin(10.0 * place + 200.0 * place * place)
+
+
+CHIRP = Effect(
+    kind=Kind.FORCE, summary="in no catalogue", equation="F = a f(x)", source="this test",
+    parameters=(Parameter("a", "N", 0.0, -10.0, 10.0, "height", strength=True),), law=chirp_law,
+    fingerprint="none", excited_by="none",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def chirping(chirp: Effect) -> tuple[Logs, Logs]:
+def chirping() -> tuple[Logs, Logs]:
     """Two logs of a machine with the chirp, and one held out."""
-    machine = replace(with_x(chirp, a=CHIRP), sample_rate=QUICK.sample_rate)
+    machine = replace(with_x(CHIRP, a=HEIGHT), sample_rate=QUICK.sample_rate)
     return recorded(machine, (1, 2), SHORT), recorded(machine, (3,), SHORT)
 
 
@@ -86,31 +94,6 @@ def honest(seed: int) -> FitResult:
     return fit(STAGE, recorded(STAGE, (seed, seed + 1), SHORT), recorded(STAGE, (seed + 2,), SHORT))
 
 
-@pytest.mark.parametrize(
-    ("force", "height", "name", "fall"),
-    [
-        ("chirp", CHIRP, MAP, 15.0),  # of an error that the physics before it has fitted to its end
-        ("hill", 0.1, MAP, 15.0),
-        ("sawtooth", 0.05, MAP, 3.5),
-        ("bend", 0.05, LEARNED, 4.0),
-    ],
-)
-@SLOW
-def test_a_force_of_no_known_effect_is_described(
-    force: str, height: float, name: str, fall: float, tmp_path: Path
-) -> None:
-    machine = with_x(foreign(force, tmp_path), a=height)
-    added = add(CATALOGUE[name], STAGE, recorded(machine, (1, 2)), recorded(machine, (3,)))
-    assert added.kept
-    assert added.candidate.gain.t > 3.0
-    assert added.step.holdout_error_before is not None
-    assert added.step.holdout_error_after is not None
-    assert added.step.holdout_error_after * fall < added.step.holdout_error_before
-    assert "not a physical law" in added.notes[0]
-    assert added.position_error[1] < added.position_error[0]
-    assert added.replayed == pytest.approx(added.position_error[1], rel=0.02)
-
-
 def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) -> None:
     assert mapped.kept
     assert mapped.candidate.gain.t > 3.0
@@ -124,13 +107,13 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
 
 
 def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
-    chirp: Effect, mapped: Addition
+    mapped: Addition,
 ) -> None:
     found, motion = mapped.candidate.fit.axis, mapped.candidate.fit.logs[0].motion
-    machine = with_x(chirp, a=CHIRP)
+    machine = with_x(CHIRP, a=HEIGHT)
     shape, true = (
         total_force(on_blocks(AxisModel(1.0, effects=(part,))), motion)
-        for part in (found[MAP], machine.axes["x"][chirp.name])
+        for part in (found[MAP], machine.axes["x"][CHIRP.name])
     )
     # A constant and the slow part of the curve are the cable's, which the model has already.
     smooth = np.polynomial.Polynomial.fit(motion.position, shape - true, 3)
@@ -138,41 +121,6 @@ def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
     assert np.sqrt(np.mean(left**2)) < 0.06 * np.sqrt(np.mean(true**2))
     assert found.mass == pytest.approx(STAGE.axes["x"].mass, rel=1e-3)
     assert found["lugre"].values["Fc"] == pytest.approx(0.285, rel=0.03)
-
-
-@DESCRIPTIONS
-@pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
-def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
-    before = honest(seed)
-    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
-    assert not found.supported
-    assert found.gain.after < 1.01 * found.gain.before
-
-
-@cache
-def noisy(judged: str) -> FitResult:
-    """A fit to noise ten times as loud as encoder and amplifier have, with or without a holdout."""
-    rng = np.random.default_rng(7)
-    logs = recorded(STAGE, (1, 2, 3), SHORT)
-    for log in logs.values():
-        log.axes["x"].columns["force"] = log.axes["x"].force + rng.normal(0.0, 0.3, len(log))
-    held = {"log 3": logs.pop("log 3")}
-    return fit(STAGE, logs, held if judged == "by held-out logs" else {})
-
-
-@pytest.mark.parametrize(
-    ("name", "judged"),
-    [
-        pytest.param(MAP, "by held-out logs", marks=SLOW),
-        pytest.param(LEARNED, "by left-out blocks", marks=SLOW),
-        pytest.param(MAP, "by left-out blocks", marks=SLOW),
-        pytest.param(LEARNED, "by held-out logs", marks=SLOW),
-    ],
-)
-def test_pure_noise_is_not_described(name: str, judged: str) -> None:
-    before = noisy(judged)
-    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
-    assert not found.supported
 
 
 @pytest.mark.parametrize("name", [MAP, pytest.param(LEARNED, marks=SLOW)])
@@ -186,28 +134,12 @@ def test_a_refit_smooths_as_was_chosen(
 
 
 @DESCRIPTIONS
-def test_it_is_saved_read_and_simulated_alike(name: str, tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
-    effect = CATALOGUE[name]
-    values = {p.name: float(rng.normal(0.0, 0.02)) for p in effect.strengths}
-    model = with_x(effect, **values)
-    save_model(model, tmp_path / "stage.toml")
-    read = load_model(tmp_path / "stage.toml", CATALOGUE)
-    assert dict(read.axes["x"][name].values) == dict(model.axes["x"][name].values)
-    found, reduced = (
-        simulate(read, "moves", seed=1, duration=1.0, simulator=stage).truth["x"]
-        for stage in (MujocoSimulator, ReducedSimulator)
-    )
-    np.testing.assert_allclose(found[name], reduced[name], rtol=0, atol=1e-6)
-    assert np.abs(found[name]).max() > 0.01
-
-
-def test_the_map_has_any_number_of_intervals(tmp_path: Path) -> None:
-    model = with_x(CATALOGUE[MAP], elements=3, x_4=0.5)
-    save_model(model, tmp_path / "stage.toml")
-    values = load_model(tmp_path / "stage.toml", CATALOGUE).axes["x"][MAP].values
-    assert values["elements"] == 3
-    assert "x_5" not in values
+@pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
+def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
+    before = honest(seed)
+    found = fit_nonparametric(before.fits["x"], before.datasets["x"], CATALOGUE[name])
+    assert not found.supported
+    assert found.gain.after < 1.01 * found.gain.before
 
 
 @SLOW
@@ -221,14 +153,197 @@ def test_a_physical_effect_takes_the_place_of_a_description(tmp_path: Path) -> N
     assert any(MAP in note for note in better.notes)
 
 
-@DESCRIPTIONS
-def test_beyond_the_covered_travel_it_says_nothing(name: str) -> None:
-    effect = CATALOGUE[name]
-    part = effect.parts[0].strengths  # by position; the learned model's first is its constant
-    constant = part if name == MAP else part[:1]
-    fitted = Fitted.at_start(effect, dict.fromkeys(constant, 0.1))
-    x = np.array([0.15 - 1e-9, 0.15 + 0.3 * 0.5 / 41, 0.17, -0.17])
-    found = forces([fitted], Motion(1e-3, x, np.full(4, 0.1), np.zeros(4)))[name]
-    assert found[0] == pytest.approx(0.1)
-    assert 0.0 < found[1] / found[0] < 1.0
-    assert not found[2:].any()
+# A description's linear algebra against dense solutions, and what is chosen by it
+
+
+WORTH = 0.99  # as it was decided
+RNG = np.random.default_rng(4)
+MAP_EFFECT = CATALOGUE["empirical_map"]
+PARTS = [part.name for part in MAP_EFFECT.parts]
+
+
+def linear(n: int = 260, seed: int = 1) -> Linearised:
+    """Two columns of physics and two parts of three and two columns, of sizes far apart."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((n, 7)) * (1e3, 1e-2, 1.0, 2.0, 0.5, 3.0, 1.0)
+    columns[:, 4] += 0.8 * columns[:, 2]
+    force = columns @ (1e-3, 20.0, 0.4, -0.3, 0.2, 0.0, 0.0) + rng.standard_normal(n)
+    physics = np.diag((2.0, 3e-5, 0, 0, 0, 0, 0))
+
+    def penalty(places, seed):
+        rows = np.zeros((2, 7))
+        rows[:, places] = np.random.default_rng(seed).standard_normal((2, len(places)))
+        return rows.T @ rows, np.isin(np.arange(7), places)
+
+    parts = {"a": penalty([2, 3, 4], 5), "b": penalty([5, 6], 6)}
+    where = [ParameterReference("", PLAIN.effects[0].effect.parameters[0])] * 7
+    return Linearised(where, force, columns, physics, parts)
+
+
+USED = {(): [0, 1], ("a",): [0, 1, 2, 3, 4], ("b",): [0, 1, 5, 6], ("a", "b"): list(range(7))}
+CHOICES = [{}, {"a": 0.3}, {"b": 2.0}, {"a": 0.05, "b": 0.7}]
+
+
+def dense(found: Linearised, stiffness, rows):
+    """Normal matrix, right side and columns from the definition, on some rows alone."""
+    used = USED[tuple(stiffness)]
+    penalty = found.physics.copy()
+    for name, value in stiffness.items():
+        penalty = penalty + len(found.force) * value**2 * found.parts[name][0]
+    columns = found.columns[np.ix_(rows, used)]
+    return columns.T @ columns + penalty[np.ix_(used, used)], columns, found.force[rows], used
+
+
+@pytest.mark.parametrize("stiffness", CHOICES, ids=lambda c: "+".join(c) or "none")
+def test_the_solution_is_that_of_the_penalised_normal_equations(stiffness):
+    found = linear()
+    matrix, columns, force, used = dense(found, stiffness, np.arange(len(found.force)))
+    change, freedom = found.solution(stiffness)
+    expected = np.linalg.solve(matrix, -columns.T @ force)
+    np.testing.assert_allclose(change[used], expected, rtol=1e-6)
+    assert not change[[i for i in range(7) if i not in used]].any()
+    hat = columns @ np.linalg.solve(matrix, columns.T)
+    assert freedom == pytest.approx(np.trace(hat), rel=1e-8)
+    assert freedom <= len(used) + 1e-9
+
+
+@pytest.mark.parametrize("stiffness", CHOICES, ids=lambda c: "+".join(c) or "none")
+def test_each_block_is_left_by_a_fit_of_the_others_alone(stiffness):
+    found = linear()
+    n = len(found.force)
+    edges = np.linspace(0, n, BLOCKS + 1).astype(int)
+    expected = np.empty(n)
+    for a, b in pairwise(edges):
+        matrix, columns, force, used = dense(found, stiffness, np.r_[0:a, b:n])
+        change = np.linalg.solve(matrix, -columns.T @ force)
+        expected[a:b] = found.force[a:b] + found.columns[a:b][:, used] @ change
+    np.testing.assert_allclose(found.left_out(stiffness), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_a_system_of_unlike_units_is_solved():
+    size = np.array([1e-6, 1.0, 1e5])
+    matrix = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 3.0]]) * np.outer(size, size)
+    several = np.stack([matrix, 2.0 * matrix, matrix + np.diag(size**2)])
+    wanted = RNG.standard_normal((3, 4)) / size[:, None]
+    np.testing.assert_allclose(solve(matrix, matrix @ wanted), wanted, rtol=1e-8)
+    for system, found in zip(several, solve(several, several @ wanted), strict=True):
+        np.testing.assert_allclose(found, solve(system, system @ wanted), rtol=1e-12)
+        np.testing.assert_allclose(found, wanted, rtol=1e-8)
+    singular = solve(np.diag([1.0, 0.0]), np.array([[2.0], [0.0]]))
+    np.testing.assert_allclose(singular, [[2.0 / (1.0 + ROUNDING)], [0.0]])
+
+
+# --- what is chosen -------------------------------------------------------------------------
+
+
+def test_one_part_gets_the_stiffness_of_least_error_left_out():
+    found = linear()
+    errors = {v: float(np.sum(found.left_out({"a": v}) ** 2)) for v in STIFFNESS}
+    best = min(errors, key=errors.__getitem__)
+    alone = replace(found, parts={"a": found.parts["a"]})
+    assert errors[best] < WORTH * float(np.sum(found.left_out({}) ** 2))
+    assert choose_stiffness(alone) == {"a": best}
+
+
+class Table:
+    """Stands in for the linear model: squared errors by the parts chosen and their stiffness."""
+
+    def __init__(self, error) -> None:
+        self.parts, self.error = dict.fromkeys("ab"), error
+
+    def left_out_error(self, stiffness):
+        return self.error(dict(stiffness))
+
+
+@pytest.mark.parametrize(("gain", "chosen"), [(WORTH + 0.001, []), (WORTH - 0.001, ["a"])])
+def test_a_part_must_be_worth_it(gain, chosen):
+    table = Table(lambda s: gain if "a" in s else 2.0 if "b" in s else 1.0)
+    assert list(choose_stiffness(table)) == chosen
+
+
+def test_the_part_that_helps_most_comes_first_and_is_tuned_again():
+    def error(s):
+        if "b" not in s:
+            return 9.0 if "a" in s else 10.0
+        first = 4.0 + abs(np.log10(s["b"]) - (0.5 if "a" not in s else -1.5))
+        return first - (3.0 - 0.1 * abs(np.log10(s["a"])) if "a" in s else 0.0)
+
+    found = choose_stiffness(Table(error))
+    assert list(found) == ["b", "a"]
+    assert found["a"] == pytest.approx(1.0)
+    assert found["b"] == pytest.approx(10.0**-1.5)
+
+
+# --- from a fit -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def about():
+    """A description about a fit of a built motion."""
+    dataset = built_dataset("run")
+    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    empty = Fitted.at_start(MAP_EFFECT)
+    return base, dataset, empty, Linearised.about(base, dataset, empty)
+
+
+def test_the_columns_are_physics_then_the_description(about):
+    base, dataset, empty, found = about
+    k = len(base.scaling.where)
+    own = [ParameterReference(MAP_EFFECT.name, p) for p in MAP_EFFECT.strengths]
+    assert list(found.where) == [*base.scaling.where, *own]
+    np.testing.assert_array_equal(found.force, base.residual)
+    np.testing.assert_array_equal(found.columns[:, :k], base.jacobian)
+    alone = replace(PLAIN, effects=(empty,))
+    np.testing.assert_array_equal(
+        found.columns[:, k:], jacobian(alone, dataset.fit, own)[base.kept]
+    )
+    ridge = (RIDGE * np.linalg.norm(base.jacobian, axis=0)) ** 2
+    np.testing.assert_allclose(np.diag(found.physics)[:k], ridge)
+    assert not found.physics[k:, k:].any()
+    assert list(found.parts) == PARTS
+    for part in MAP_EFFECT.parts:
+        rows, mask = found.parts[part.name]
+        assert {w.parameter.name for w, m in zip(found.where, mask, strict=True) if m} == set(
+            part.strengths
+        )
+        assert rows[np.ix_(mask, mask)].any()
+        assert not rows[~mask].any()
+
+
+def test_parts_that_were_not_chosen_are_zero_and_held(about):
+    _, _, empty, found = about
+    change = 1.0 + np.arange(len(found.where))
+    chosen = PARTS[1]
+    filled = _filled(empty, found, {chosen: 0.125}, change)
+    step = {c.parameter.name: x for c, x in zip(found.where, change, strict=True) if c.effect}
+    for part in MAP_EFFECT.parts:
+        for name in part.strengths:
+            assert filled.values[name] == (step[name] if part.name == chosen else 0.0)
+            assert (name in filled.fixed) is (part.name != chosen)
+    stiffness = next(p.stiffness for p in MAP_EFFECT.parts if p.name == chosen)
+    assert filled.values[stiffness] == 0.125
+    assert f"it depends on {chosen}, and is valid only" in nonparametric_in_words(filled)
+    assert "found nothing to depend on" in nonparametric_in_words(empty)
+
+
+@pytest.mark.parametrize("held", [("held",), ()])
+def test_curves_count_as_many_parameters_as_they_are_worth(held):
+    dataset = built_machine(built_dataset("run", held=held), PLAIN, lambda x, turn: 40.0 * x**2)
+    made = fit_nonparametric(fit_axis(PLAIN, dataset.fit), dataset, MAP_EFFECT)
+    assert 1 < made.evidence.parameters < 0.3 * len(MAP_EFFECT.strengths)
+    assert made.evidence.samples == effective_samples(made.fit.residual)
+    assert made.part > 0.9
+
+
+# --- descriptions and physics ---------------------------------------------------------------
+
+
+def test_descriptions_are_told_from_physics():
+    axis = axis_of(fitted("cogging"), Fitted.at_start(MAP_EFFECT))
+    labels = nonparametric_labels(axis)
+    assert labels == {f"{MAP_EFFECT.name}.{p.name}" for p in MAP_EFFECT.strengths}
+    assert nonparametric_labels(PLAIN) == frozenset()
+    stage = MachineModel("s", {"x": axis, "y": replace(PLAIN, mass=7.0)})
+    found = physics_alone(stage)
+    assert found.axes["x"].names == ("coulomb_viscous", "cogging")
+    assert found.axes["y"] == stage.axes["y"]

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 from cli_runs import twin
+from machines import CATALOGUE, PROTON
 
 import identify
 from identify.testing import assert_agree
 from identify.validation.agreement import agreement
-from twin.effects import Catalogue, load_catalogue
+from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
-CATALOGUE = load_catalogue()
 OWN = ("coulomb_viscous", "cable_slab")
 FEW = Catalogue([CATALOGUE[n] for n in (*OWN, "constant_force", "payload_mass", "wear")])
 
@@ -107,7 +107,7 @@ def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) ->
     with pytest.raises(AssertionError, match="the model is wrong"):
         assert_agree(path, fitted(above=9.0, mass=11.0), catalogue=FEW)
     with pytest.raises(InputError, match="nothing can be compared"):
-        assert_agree(path, load_model("proton_xy", CATALOGUE), catalogue=FEW)
+        assert_agree(path, PROTON, catalogue=FEW)
 
 
 def test_the_command_ends_with_1_where_the_fits_differ(tmp_path: Path) -> None:

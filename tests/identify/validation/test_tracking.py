@@ -7,19 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import CATALOGUE
 from cli_runs import refusal, twin
+from machines import CATALOGUE, tracked
 from planted_logs import SLIDE
 
 from identify import feedforward
 from twin.effect import Kind
 from twin.errors import CannotRun, InputError
-from twin.experiments.named import simulate
 from twin.laws.trials import moderate
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, Hardware, MachineModel
-from twin.simulator import ReducedSimulator
 
 HARDWARE = Hardware(
     travel=(-0.1, 0.1), encoder_noise=1e-9, velocity=0.2, acceleration=2.0, jerk=100.0
@@ -41,7 +39,7 @@ def having(effect: str) -> MachineModel:
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    return simulate(KNOWN, "moves", seed=2, duration=3.0, simulator=ReducedSimulator)
+    return tracked(KNOWN, 2, 3.0, "moves")
 
 
 @pytest.mark.parametrize("effect", HIDDEN)
@@ -62,12 +60,12 @@ def test_a_log_without_a_setpoint_is_followed_as_it_moved(log) -> None:
     assert found.diagnosed.rms < found.before.rms / 3.0
 
 
-def test_without_a_model_before_every_effect_has_its_gain(log) -> None:
-    model = having("cogging")
-    found = feedforward(model, log).axes["x"]
-    assert found.before is None
-    assert set(found.gains) == set(model.axes["x"].names)
-    assert min(found.gains.values()) > 0.0
+def test_the_machine_may_be_another_than_the_model(log) -> None:
+    machine = having("cogging")
+    found = feedforward(KNOWN, log, machine=machine).axes["x"]
+    other = feedforward(machine, log, KNOWN).axes["x"]
+    assert found.diagnosed == other.before
+    assert CATALOGUE["cogging"].kind is Kind.FORCE
 
 
 def test_a_friction_takes_the_place_of_the_one_before(log) -> None:
@@ -78,12 +76,12 @@ def test_a_friction_takes_the_place_of_the_one_before(log) -> None:
     assert found.gains == {"lugre": pytest.approx(found.before.rms - found.diagnosed.rms)}
 
 
-def test_the_machine_may_be_another_than_the_model(log) -> None:
-    machine = having("cogging")
-    found = feedforward(KNOWN, log, machine=machine).axes["x"]
-    other = feedforward(machine, log, KNOWN).axes["x"]
-    assert found.diagnosed == other.before
-    assert CATALOGUE["cogging"].kind is Kind.FORCE
+def test_without_a_model_before_every_effect_has_its_gain(log) -> None:
+    model = having("cogging")
+    found = feedforward(model, log).axes["x"]
+    assert found.before is None
+    assert set(found.gains) == set(model.axes["x"].names)
+    assert min(found.gains.values()) > 0.0
 
 
 def test_the_command_tells_what_the_call_gives(tmp_path, log) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from built_fits import HARDWARE, axis_of, fitted
 from constructed import log_of
+from machines import tracked
 
 from identify.dataset.motion import motion_of
 from identify.testing import assert_agree
 from studies.thesis.following import closed_loop_errors, identified, twin_of
-from twin.experiments.named import simulate
 from twin.model.machine import MachineModel
 from twin.simulator import ReducedSimulator
 
@@ -34,7 +34,7 @@ def test_errors_of_the_closed_loop_are_parts_of_what_the_machine_did() -> None:
 
 
 def test_a_log_and_its_twin_agree_and_move_alike() -> None:
-    log = simulate(MACHINE, "tracking", seed=4, duration=5.0, simulator=ReducedSimulator)
+    log = tracked(MACHINE, 4, 5.0)
     fit = identified(MACHINE, log)
     follower = twin_of(fit, log, simulator=ReducedSimulator)
     assert_agree(fit, identified(MACHINE, follower))
@@ -46,7 +46,7 @@ def test_a_log_and_its_twin_agree_and_move_alike() -> None:
 def test_a_twin_is_as_noisy_as_the_log_where_the_model_does_not_say(own: float) -> None:
     noisy = replace(DRIVE, hardware=replace(DRIVE.hardware, encoder_noise=5e-6))
     machine = MachineModel("drive", {"x": noisy}, RATE)
-    log = simulate(machine, "tracking", seed=4, duration=3.0, simulator=ReducedSimulator)
+    log = tracked(machine, 4, 3.0)
     model = replace(DRIVE, hardware=replace(DRIVE.hardware, encoder_noise=own))
     follower = twin_of(MachineModel("drive", {"x": model}, RATE), log, simulator=ReducedSimulator)
     noise = {k: motion_of(one, "x", k).position_noise for k, one in (("m", log), ("t", follower))}

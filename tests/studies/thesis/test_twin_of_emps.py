@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from machines import CATALOGUE
 from scipy.io import loadmat
 
 from identify.testing import assert_agree
 from identify.workflow import agree
 from studies.thesis.following import closed_loop_errors, identified, twin_of
 from twin.core.loop import Controller
-from twin.effects import load_catalogue
 from twin.experiments.follow import recorded_setpoint
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
@@ -27,7 +27,6 @@ from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-CATALOGUE = load_catalogue()
 WINDOW = 0.2  # s
 PUBLISHED = {
     "DATA_EMPS": {"position": 1.375e-4, "acceleration": 0.0860, "force": 0.0585},

@@ -1,85 +1,16 @@
 """Machine code kept on disk is never older than the source: not the function's own, nor what is
 compiled into it."""
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 from types import FunctionType
 
 import numpy as np
 import pytest
 
-from twin.core import compiled
 from twin.core.compiled import digest
 from twin.effects import load_catalogue
 from twin.laws.trials import Motion, forces
 from twin.model.machine import Fitted
-
-PACKAGE = Path(compiled.__file__).parent.parent
-
-SCRIPT = """
-import json
-import numpy as np
-from twin.effects import load_catalogue
-from twin.experiments.named import simulate
-from twin.laws.trials import Motion, forces
-from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.simulator import ReducedSimulator
-
-k = np.arange(40)
-motion = Motion(1e-3, 0.01 * k, np.sin(k), np.ones(40))
-
-def along(name, **values):
-    fitted = Fitted.at_start(load_catalogue()[name], values)
-    return float(np.abs(forces([fitted], motion)[name]).sum())
-
-free = MachineModel("free", {"x": AxisModel(3.0, Hardware(travel=(-0.2, 0.2)), ())})
-log = simulate(free, "moves", seed=1, duration=0.3, simulator=ReducedSimulator)
-print(json.dumps({
-    "law": along("quadratic_drag", c=2.0),
-    "structure": along("flexible_mode", load=0.2, frequency=30.0, damping=0.1),
-    "control": float(np.abs(log.axes["x"].force).sum()),
-}))
-"""
-
-CHANGES = {
-    "effects/quadratic_drag.py": ("io[OUT] = -", "io[OUT] = -2.0 * "),
-    "core/native.py": (
-        "now = slope(velocity, k, block)",
-        "now = 2.0 * slope(velocity, k, block)",
-    ),
-    "core/loop.py": ("gains[KP] *", "2.0 * gains[KP] *"),
-}
-
-
-def run(folder: Path) -> dict[str, float]:
-    """Numbers of the copied package, from a process of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_OPT": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], cwd=folder, env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-@pytest.mark.slow
-def test_a_change_of_law_structure_or_controller_is_seen_by_the_next_process(tmp_path):
-    # Times of change are copied too, so the copy begins with the caches that the suite has filled.
-    shutil.copytree(PACKAGE, tmp_path / "twin")
-    shutil.copytree(PACKAGE.parent / "models", tmp_path / "models")
-    before = run(tmp_path)
-    for name, (old, new) in CHANGES.items():
-        path = tmp_path / "twin" / name
-        text = path.read_text()
-        assert text.count(old) == 1, name
-        path.write_text(text.replace(old, new))
-    after = run(tmp_path)
-    for what, value in before.items():
-        assert value > 0.0, what
-        assert abs(after[what] / value - 1.0) > 1e-6, f"{what}: the old code ran"
 
 
 def shifted(x):

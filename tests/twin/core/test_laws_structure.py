@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 from axis_runs import BOTH, RATE, Pushed, Stepper, effect, pushed, shoves
-from effect_runs import CATALOGUE
+from machines import CATALOGUE
 from scipy.integrate import solve_ivp
 
 from twin.laws.trials import Motion, forces
@@ -22,7 +22,6 @@ MASS = 3.7  # kg
 H = 1.0 / RATE
 N = 1800
 STICKS = effect("stribeck", Fc=2.0, Fs=2.7, v0=0.02, sigma2=1.3)
-COULOMB = effect("coulomb_viscous", Fc=2.0, Fs=2.7, sigma2=1.3)
 ASYMMETRY = effect("asymmetric_friction", coulomb=0.2, viscous=-0.3)
 CABLE = effect("cable_slab", offset=0.6, k1=7.0, k2=-3.0)
 DEADBAND = effect("actuator_deadband", width=0.35)
@@ -51,23 +50,6 @@ AROUND = (STICKS, ASYMMETRY, CABLE, DEADBAND)
 def shoved(names: tuple[str, ...], stage: Stepper) -> Pushed:
     """The axis with these parts, and what holds and rubs it, under the shoves."""
     return pushed(MASS, (*AROUND, *(PARTS[n] for n in names)), SHOVES, stage)
-
-
-@EACH
-@pytest.mark.parametrize(
-    ("ratio", "friction"), [(-0.4, STICKS), (3.0, COULOMB)], ids=["stribeck", "coulomb"]
-)
-def test_a_payload_is_mass_also_where_friction_holds(ratio, friction, stage):
-    around = (friction, ASYMMETRY, CABLE, DEADBAND, effect("cable_hysteresis", reach=3e-4, f1=0.7))
-    force = shoves(N, 3.0)
-    found = pushed(MASS, (*around, effect("payload_mass", ratio=ratio)), force, stage)
-    wanted = pushed(MASS * (1.0 + ratio), around, force, stage)
-    assert 0.1 < np.mean(wanted.v == 0.0) + np.mean(np.abs(wanted.v) < 1e-12) < 0.9
-    np.testing.assert_allclose(found.x, wanted.x, rtol=0, atol=1e-11 * np.ptp(wanted.x))
-    np.testing.assert_allclose(found.v, wanted.v, rtol=0, atol=1e-11 * np.ptp(wanted.v))
-    name = friction.effect.name
-    size = 1e-9 * np.abs(wanted.rows[name]).max()
-    np.testing.assert_allclose(found.rows[name], wanted.rows[name], rtol=0, atol=size)
 
 
 @EACH
@@ -129,28 +111,6 @@ def test_momentum_of_all_parts_is_the_impulse_from_outside(names, stage):
             momentum += values["load"] * MASS * np.r_[0.0, run.states[f"{name}_speed"][:-1]]
     impulse = np.r_[0.0, np.cumsum(outside)[:-1]] * H
     np.testing.assert_allclose(momentum, impulse, rtol=0, atol=1e-9 * np.abs(impulse).max())
-
-
-FREE = [("flexible_mode", "load"), ("base_vibration", "recoil")]
-
-
-@pytest.mark.parametrize(("name", "share"), FREE, ids=[n for n, _ in FREE])
-@pytest.mark.parametrize("part", [0.2, 0.6])
-def test_a_free_axis_swings_at_the_frequency_and_damping_of_two_masses(name, share, part):
-    """w/sqrt(1 - share), ratio/sqrt(1 - share): the poles of the free motion."""
-    frequency, ratio = 23.0, 0.06
-    force = np.zeros(900)
-    force[:25] = 4.0
-    run = pushed(MASS, (effect(name, frequency=frequency, damping=ratio, **{share: part}),), force)
-    s = run.states[f"{name}_displacement"][40:]
-    step = 20
-    now, after, later = s[: -2 * step], s[step:-step], s[2 * step :]
-    (trace, minus), *_ = np.linalg.lstsq(np.stack([after, now], 1), later, rcond=None)
-    pole = np.log(complex(np.roots([1.0, -trace, -minus])[0])) / (step * H)
-    w = 2.0 * np.pi * frequency / np.sqrt(1.0 - part)
-    # explicit in the spring: relative error of the order of (w h)^2 and ratio w h
-    assert np.abs(pole) == pytest.approx(w, rel=2.0 * ratio * w * H)
-    assert -pole.real / np.abs(pole) == pytest.approx(ratio / np.sqrt(1.0 - part), rel=0.05)
 
 
 @SETS

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE
+from machines import CATALOGUE
 
 from identify.dataset.motion import Blocks, Motion
 from identify.dataset.prepared_log import total_force, total_forces
@@ -101,10 +101,6 @@ def test_columns_times_strengths_are_the_law(effect: Effect, laid: dict[str, flo
         force = total_force(table, along)
         wanted = np.lib.stride_tricks.sliding_window_view(force, 40)[::stride] @ weights
     np.testing.assert_allclose(columns.T @ strengths, wanted, atol=1e-13)
-
-
-def test_some_force_and_some_sensing_effect_have_columns() -> None:
-    assert {e.kind for e in COLUMNS} >= {Kind.FORCE, Kind.SENSING}
 
 
 def test_a_reading_is_delayed_then_rippled_then_rounded_in_whatever_order_they_are_given() -> None:

@@ -10,7 +10,8 @@ from math import copysign, sin
 import numpy as np
 import pytest
 from axis_runs import BOTH, Stepper
-from effect_runs import CATALOGUE, FRICTIONS
+from effect_runs import FRICTIONS
+from machines import CATALOGUE, PROTON
 
 from twin.effect import DRY, INDEX, OUT, READING, TIME, VISCOUS, Effect, Kind, Parameter, V, X
 from twin.experiments.named import simulate
@@ -19,10 +20,8 @@ from twin.laws.checks import LawBroken
 from twin.laws.trials import absent, moderate
 from twin.laws.verdict import LAWS, Law
 from twin.logs import Log
-from twin.model.file import load_model
 from twin.model.machine import Fitted
 
-STAGE = load_model("proton_xy", CATALOGUE)
 # What a modifier does to the work of every friction is tried from the friction's side.
 PAIRS = [
     (law, e)
@@ -57,7 +56,7 @@ def test_some_forces_depend_on_position_alone() -> None:
 
 def logged(effects: Sequence[Fitted], stage: Stepper) -> Log:
     """A log of the stage with those effects on x."""
-    model = STAGE.with_axis("x", replace(STAGE.axes["x"], effects=tuple(effects)))
+    model = PROTON.with_axis("x", replace(PROTON.axes["x"], effects=tuple(effects)))
     return simulate(model, "moves", seed=3, duration=0.1, simulator=stage)
 
 
@@ -71,7 +70,7 @@ ALL_BUT_FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is not Kind.FR
 def test_simulation_with_zero_strength_is_that_without(effects, stage):
     """Each friction in the place of the stage's, and all other effects at once."""
     kinds = {e.kind for e in effects}
-    beside = [f for f in STAGE.axes["x"].effects if f.effect.kind not in kinds]
+    beside = [f for f in PROTON.axes["x"].effects if f.effect.kind not in kinds]
     zero = logged([*beside, *(Fitted.at_start(e, absent(e)) for e in effects)], stage)
     assert len(zero) > 500
     for axis, wanted in logged(beside, stage).axes.items():

@@ -1,17 +1,22 @@
-"""What effects declare: bounds that follow from the unit and the meaning of a parameter.
+"""What effects declare: bounds that follow from a parameter's unit and meaning, names, elements.
 
-What a declaration refuses is tried on both sides of each bound.
-"""
+What a declaration refuses is tried on both sides of each bound."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from constructed import COVERED
-from effect_runs import CATALOGUE, LOG
+from effect_runs import FRICTIONS, LOG
+from machines import CATALOGUE, PROTON
 
 from twin.curve import Coordinate, Curve, Part
-from twin.effect import Effect, Kind, Parameter, V
+from twin.effect import ELEMENTS, Effect, Kind, Parameter, V
+from twin.errors import InputError
+from twin.model.file import load_model, save_model
+from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.parameters import free_parameters
 from twin.model.units import Scale, has_size
 
 PARAMETERS = [(e, p) for e in CATALOGUE.values() for p in e.parameters]
@@ -153,3 +158,110 @@ def test_several_of_one_effect_have_a_number_each() -> None:
     assert "cogging_3" in names
     assert not {"cogging", "cogging_2", "lugre"} & set(names)
     assert len(names) == len(CATALOGUE) - 1
+
+
+# A diagnosis offers each law once, by the name that fits the axis and what it has already
+
+
+CABLE = {"cable_slab", "cable_hysteresis"}
+GENERAL = {"spring", "presliding_hysteresis"}
+BARE = AxisModel(1.0)
+
+
+def offered(axis: AxisModel) -> set[str]:
+    return {e.name for e in CATALOGUE.after(axis.names) if axis.can_have(e)}
+
+
+def having(*names: str, rotary: bool = False) -> AxisModel:
+    fitted = tuple(Fitted.at_start(CATALOGUE[n]) for n in names)
+    return AxisModel(1.0, effects=fitted, rotary=rotary)
+
+
+def test_a_machine_without_a_cable_is_offered_no_cable() -> None:
+    assert offered(BARE) >= GENERAL
+    assert not CABLE & offered(BARE)
+    for name in CABLE:
+        beside = offered(having(name))
+        assert not GENERAL & beside
+        assert CABLE - {name} <= beside
+    assert not CABLE & offered(having("spring"))
+
+
+def test_viscous_friction_is_offered_where_no_friction_has_it() -> None:
+    assert "viscous_friction" in offered(BARE)
+    assert "viscous_friction" in offered(having("cogging"))
+    for friction in FRICTIONS:
+        assert "viscous_friction" not in offered(having(friction.name))
+
+
+def test_gravity_is_offered_where_the_axis_turns() -> None:
+    assert "gravity" in offered(having(rotary=True))
+    assert "gravity" not in offered(BARE)
+    assert "constant_force" in offered(BARE), "the weight of a tilted slide"
+
+
+def test_the_stage_with_a_cable_keeps_its_names() -> None:
+    stage = PROTON
+    for axis in stage.axes.values():
+        assert not GENERAL & offered(axis)
+        assert "cable_hysteresis" in offered(axis)
+
+
+# Frictions of any number of elements, given in the model file
+
+
+SIZED = [e for e in FRICTIONS if e.of_size is not None]
+EVERY = pytest.mark.parametrize("effect", SIZED, ids=lambda e: e.name)
+FILE = """
+name = "one axis"
+[axes.x]
+mass = 2.0\ntravel = [-0.1, 0.1]
+[axes.x.effects.{name}]
+{lines}
+"""
+
+
+def loaded(folder: Path, name: str, lines: str) -> MachineModel:
+    path = folder / "stage.toml"
+    path.write_text(FILE.format(name=name, lines=lines))
+    return load_model(path, CATALOGUE)
+
+
+@EVERY
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_model_file_says_how_many_elements(effect: Effect, count: int, tmp_path: Path) -> None:
+    fitted = loaded(tmp_path, effect.name, f"elements = {count}").axes["x"][effect.name]
+    assert fitted.effect.name == effect.name
+    assert fitted.values[ELEMENTS] == count
+    assert fitted.values[f"share_{count}"] == 1.0
+    assert len(fitted.effect.states) in (count, 2 * count)
+    assert f"share_{count + 1}" not in fitted.values
+
+
+@EVERY
+def test_elements_and_their_own_values_survive_saving(effect: Effect, tmp_path: Path) -> None:
+    lines = "elements = 7\nFc = 0.2\nFs = 0.25\nstiff_7 = 0.125\nshare_2 = 3.0\nfixed = []"
+    model = loaded(tmp_path, effect.name, lines)
+    save_model(model, tmp_path / "again.toml")
+    again = load_model(tmp_path / "again.toml", CATALOGUE)
+    assert again.axes["x"][effect.name].values == model.axes["x"][effect.name].values
+    assert again.axes["x"][effect.name].effect is model.axes["x"][effect.name].effect
+
+
+@EVERY
+def test_their_number_is_never_fitted_and_few_numbers_are_unless_asked(effect, tmp_path):
+    def fitted(lines: str) -> set[str]:
+        free = free_parameters(loaded(tmp_path, effect.name, lines).axes["x"])
+        return {c.parameter.name for c in free}
+
+    assert "stiff_2" in fitted("elements = 2\nfixed = []")
+    assert ELEMENTS not in fitted("elements = 2\nfixed = []")
+    assert {"Fc", "Fs", "v0", "sigma2", "sigma0", "spread"} <= fitted("elements = 2")
+    assert len(fitted("elements = 2")) <= 8, "the mass too"
+
+
+@EVERY
+@pytest.mark.parametrize("count", ["0", "2.5", "1001", '"six"'])
+def test_a_bad_number_of_elements_is_refused(effect: Effect, count: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"whole number of elements from 1 to 1000"):
+        loaded(tmp_path, effect.name, f"elements = {count}")

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_runs import CATALOGUE, LOG
+from effect_runs import LOG
+from machines import CATALOGUE
 
 from twin.effect import IO_SIZE, OUT, Effect, Excitation, U, X
 from twin.excitation import Repeating

@@ -1,15 +1,19 @@
-"""A user's own effect: a mistake, or a law that is broken, is one line without traceback."""
+"""A user's own effect: a mistake or a broken law is one line; its equation is read or refused."""
 
 import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from axis_runs import BOTH, Stepper, pushed
 from cli_runs import refusal, twin
 
 from twin.effects import load_catalogue
 from twin.errors import InputError
+from twin.laws.formula import NoFormula, formula
 from twin.laws.verdict import LAWS
+from twin.model.machine import Fitted
 
 SOURCE = Path(__file__).parents[3] / "examples" / "my_effect.py"
 LAW_END = "io[OUT] = -p[0] * distance * exp(-ratio * ratio)"
@@ -69,6 +73,38 @@ def test_the_name_of_another_effect_is_refused(name: str, times: int, tmp_path: 
     path.write_text(SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(InputError, match=f"there is an effect '{name}' already; give the file"):
         load_catalogue([path] * times)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\n", "defines no EFFECT"),
+        ("EFFECT = 3\n", "defines no EFFECT"),
+        ("import no_such_module_anywhere\n", "cannot be loaded as an effect"),
+        ("def law(:\n", "cannot be loaded as an effect"),
+        (SOURCE.read_text(encoding="utf-8").replace('"place"', '"k"'), "used twice"),
+        (None, "no such effect file"),
+    ],
+)
+def test_a_file_that_is_no_effect_is_refused_in_one_line(text, message: str, tmp_path) -> None:
+    path = tmp_path / "bad.py"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        load_catalogue([path])
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("stage", BOTH)
+def test_an_effect_acts_as_its_file_reads_now(stage: Stepper, tmp_path: Path) -> None:
+    """Native code of the old text must not live on in a cache."""
+    path = tmp_path / "mine.py"
+    for sign, factor in (("-", 1.0), ("-2.0 * ", 2.0)):
+        path.write_text(DRAG.format(sign=sign, equation="F = -c v"), encoding="utf-8")
+        fitted = Fitted.at_start(load_catalogue([path])["mine"], {"c": 5.0})
+        run = pushed(3.0, [fitted], np.full(500, 4.0), stage)
+        np.testing.assert_allclose(run.of("mine"), -5.0 * factor * run.v, atol=1e-12)
 
 
 BROKEN = {
@@ -180,3 +216,48 @@ def test_a_brake_that_drives_is_found(case: str, tmp_path: Path) -> None:
     failed = [line for line in done.stdout.splitlines() if "FAILED" in line]
     assert done.returncode == (law is not None), done.stdout + done.stderr
     assert [law in line for line in failed] == [True] * (law is not None)
+
+
+# The equation that an effect states is read as people write it, or refused as words
+
+
+X, V = np.linspace(-0.3, 0.4, 50), np.linspace(0.5, -0.2, 50)
+NAMES = {"k": 3.0, "w": 0.2, "c": 7.0, "n": 1.5, "place": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("F = -k d exp(-(d/w)^2),  d = x - place",
+         -3.0 * (X - 0.1) * np.exp(-(((X - 0.1) / 0.2) ** 2))),
+        ("F = -c |v/w|^n sgn(v);  with n = 2: drag", -7.0 * np.abs(V / 0.2) ** 1.5 * np.sign(V)),
+        ("F = -c v |v|", -7.0 * V * np.abs(V)),
+        ("F = -(k d + 2 d^3);  d = e/w, e = x - place",
+         -(3.0 * (X - 0.1) / 0.2 + 2.0 * ((X - 0.1) / 0.2) ** 3)),
+        ("F = k cos(2 pi x/w)", 3.0 * np.cos(2.0 * np.pi * X / 0.2)),
+    ],
+)  # fmt: skip
+def test_it_is_computed_as_it_is_written(text, wanted):
+    computed = formula(text, NAMES)
+    np.testing.assert_allclose(computed({"x": X, "v": V, "t": 0.0 * X, **NAMES}), wanted)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a brake in proportion to speed", "F = sum_k a_k x", "F = -k x where it pushes", "F = k (x",
+     "F = E(x) k", "F = -k x = -m g", "F = __import__(1)"],
+)  # fmt: skip
+def test_an_explanation_is_no_formula(text):
+    with pytest.raises(NoFormula):
+        formula(text, NAMES)({"x": X, "v": V, "t": X, **NAMES})
+
+
+def test_effects_of_the_catalogue_are_among_what_is_compared():
+    read = set()
+    for effect in load_catalogue().values():
+        try:
+            formula(effect.equation, [p.name for p in effect.parameters])
+        except NoFormula:
+            continue
+        read.add(effect.name)
+    assert {"spring", "viscous_friction", "quadratic_drag", "constant_force"} <= read

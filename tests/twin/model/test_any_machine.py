@@ -5,22 +5,25 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from axis_kinds import (
-    CATALOGUE,
     LINEAR_AXIS,
     MACHINES,
     OF_A_HINGE,
     OF_A_SLIDE,
+    ROTARY_AXIS,
     ROUNDING,
+    SLIDE,
     THREE,
     machine,
     stated_units,
 )
+from machines import CATALOGUE
 
 from identify import workflow
 from identify.dataset.coordinates import coordinates_of
@@ -34,12 +37,14 @@ from identify.results.results import Addition, Diagnosis, FitResult
 from twin.checks import check_log
 from twin.effects import Catalogue
 from twin.errors import InputError
+from twin.experiments.file import format_experiment
 from twin.experiments.kinds import Passes
-from twin.experiments.named import outside_travel, simulate
+from twin.experiments.named import simulate
 from twin.logs import Log, read_log, write_log
 from twin.model.file import format_model, parse_model
 from twin.model.machine import MachineModel
-from twin.model.units import LINEAR, ROTARY, AxisUnits
+from twin.model.units import LINEAR, ROTARY, AxisUnits, units_of
+from twin.mujoco.mjcf import machine_spec
 from twin.simulator import ReducedSimulator
 
 TRIED = ("cogging", "constant_force", "quadratic_drag", "axis_coupling")
@@ -115,19 +120,6 @@ def texts(r: Round) -> str:
     return "\n".join(shown)
 
 
-def test_both_simulations_agree_to_rounding(gone_round: Round) -> None:
-    reduced = simulate(
-        gone_round.truth, "tracking", seed=1, duration=DURATION, simulator=ReducedSimulator
-    )
-    logged = gone_round.logs["log 1"]
-    for name, axis in gone_round.model.axes.items():
-        travel = np.ptp(axis.hardware.travel)
-        own = logged.truth[name]["position"]
-        assert np.abs(own - reduced.truth[name]["position"]).max() < ROUNDING * travel
-        assert np.ptp(own) > 0.3 * travel
-        assert not outside_travel(gone_round.model, logged)
-
-
 def test_the_log_states_its_units_and_is_fit(gone_round: Round) -> None:
     log = gone_round.logs["log 1"]
     assert check_log(log).ok
@@ -136,21 +128,6 @@ def test_the_log_states_its_units_and_is_fit(gone_round: Round) -> None:
         units = log.axes[name].units
         assert log.axes[name].kind == axis.units
         assert (units["position"], units["force"]) == (axis.units.position, axis.units.force)
-
-
-def test_a_fit_recovers_what_was_planted(gone_round: Round) -> None:
-    for name, planted in gone_round.truth.axes.items():
-        found = gone_round.fitted.model.axes[name]
-        assert found.mass == pytest.approx(planted.mass, rel=0.01)
-        for f in planted.effects:
-            for p in ("Fc", "sigma2", "a1", "p", "c"):
-                if f.values.get(p):
-                    value = found[f.effect.name].values[p]
-                    assert value == pytest.approx(f.values[p], rel=0.03), (name, p)
-        label = planted.units.mass_name
-        own = {e.label: e for e in gone_round.fitted.estimates[name]}
-        assert own[label].unit == planted.units.mass
-        assert own["coulomb_viscous.sigma2"].unit == planted.units("N s/m")
 
 
 def test_the_hidden_effect_is_named_and_added(gone_round: Round) -> None:
@@ -268,3 +245,135 @@ def test_one_axis_moves_while_two_rest() -> None:
     assert compared.position_error["passes"] < 1e-3
     with pytest.raises(InputError, match="has 3 axes, not two"):
         simulate(model, Passes("z", span=0.3, speed=0.2, repeats=1, other=0.1))
+
+
+# A rotary axis: its entries, its inertia and its hinge, and the counterparts of linear units
+
+
+def test_a_plan_is_in_units_of_the_axis() -> None:
+    model = machine(ROTARY_AXIS)
+    chosen = workflow.plan(
+        model, catalogue=CATALOGUE, duration=2.0, axis="c",
+        between=(CATALOGUE["cogging"], CATALOGUE["quadratic_drag"]),
+    )  # fmt: skip
+    shown = text.plan_text(chosen)
+    assert not (wrong := OF_A_SLIDE.search(shown)), wrong
+    assert "N·m RMS unexplained" in shown
+    assert stated_units(as_json.json_of(chosen)) == {"N m", "s"}
+    planned = Passes("c", span=0.3, speed=0.2, repeats=1)
+    file = format_experiment(planned, units=model.axis("c").units)
+    assert "# rad, length of a pass" in file
+    assert "# rad/s, held" in file
+
+
+@pytest.mark.parametrize(
+    ("log_of", "model_of", "message"),
+    [
+        ("rotary", SLIDE.replace("axes.x", "axes.c"), r"is rotary \(position in rad\), .* in m\)"),
+        ("linear", ROTARY_AXIS.replace("axes.c", "axes.x"), r"is linear \(position in m\), .* rad"),
+    ],
+)  # fmt: skip
+def test_a_log_of_the_other_kind_is_refused(log_of: str, model_of: str, message: str) -> None:
+    log = simulate(machine(MACHINES[log_of][0]), "tracking", duration=1.0)
+    for act in (workflow.fit, workflow.compare):
+        with pytest.raises(InputError, match=message) as told:
+            act(machine(model_of), {"run": log})
+        assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("toml", "message"),
+    [
+        (ROTARY_AXIS.replace("inertia", "mass = 1.0\ninertia"), "both mass and inertia"),
+        (ROTARY_AXIS.replace("inertia = 0.02", ""), "no mass; .* kg m.2 for a rotary axis"),
+        (ROTARY_AXIS.replace("0.02", "'big'"), "inertia = 'big': give a number .* kg m.2"),
+        (ROTARY_AXIS.replace("= 0.01\n", "= -1.0\n"), r"sigma2 = -1 N m s/rad: outside"),
+        (ROTARY_AXIS.replace("inertia", "inertja"), "did you mean 'inertia'"),
+    ],
+)
+def test_a_wrong_rotary_axis_is_refused_in_its_units(toml: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as told:
+        machine(toml)
+    assert "\n" not in str(told.value)
+
+
+def test_a_held_inertia_is_said_and_kept() -> None:
+    model = machine(ROTARY_AXIS.replace("0.02", "0.02\nfixed = ['inertia']"))
+    assert model.axes["c"].mass_fixed
+    assert "inertia = 0.02 # kg m^2" in format_model(model)
+    assert machine(format_model(model).partition("Hz\n")[2]).axes == model.axes
+
+
+def test_a_stage_mounts_on_slides_and_hinges_of_its_own() -> None:
+    mixed = machine(SLIDE + ROTARY_AXIS)
+    spec = machine_spec(mixed)
+    assert spec.joint("x").type == mujoco.mjtJoint.mjJNT_SLIDE
+    assert spec.joint("c").type == mujoco.mjtJoint.mjJNT_HINGE
+    log = simulate(mixed, "tracking", duration=1.0)
+    assert (log.axes["x"].kind, log.axes["c"].kind) == (LINEAR, ROTARY)
+    reduced = simulate(mixed, "tracking", duration=1.0, simulator=ReducedSimulator)
+    for axis in "xc":
+        gone = log.truth[axis]["position"] - reduced.truth[axis]["position"]
+        assert np.abs(gone).max() < ROUNDING
+    motion = datasets(mixed, {"run": log}, {})["x"].fit[0].motion
+    assert unit_of("other_axis_velocity", motion) == "rad/s"
+    assert unit_of("velocity", motion) == "m/s"
+
+
+@pytest.mark.parametrize("effect", ["flexible_mode", "base_vibration", "backlash", "payload_mass"])
+def test_attached_inertias_agree_on_a_hinge(effect: str) -> None:
+    values = {"flexible_mode": "load = 0.3", "base_vibration": "recoil = 0.2",
+              "backlash": "load = 0.3\nplay = 1e-3", "payload_mass": "ratio = 0.3"}  # fmt: skip
+    model = machine(f"{ROTARY_AXIS}[axes.c.effects.{effect}]\n{values[effect]}\n")
+    runs = [
+        simulate(model, "tracking", duration=1.0, **more).truth["c"]["position"]
+        for more in ({}, {"simulator": ReducedSimulator})
+    ]
+    assert np.abs(runs[0] - runs[1]).max() < 1e-12
+
+
+def test_a_joint_of_the_other_kind_is_refused() -> None:
+    spec = machine_spec(machine(ROTARY_AXIS))
+    spec.compile()
+    slide = replace(
+        machine(SLIDE.replace("axes.x", "axes.c")), mjcf=spec.to_xml(), mjcf_name="c.xml"
+    )
+    with pytest.raises(InputError, match=r"joint 'c' is not a slide, but the axis is linear"):
+        machine_spec(slide)
+
+
+def test_what_repeats_may_repeat_once_a_turn() -> None:
+    for effect in CATALOGUE.values():
+        for p in effect.parameters:
+            assert not p.period or p.upper > 2.0 * np.pi, f"{effect.name}.{p.name}"
+
+
+UNITS = {
+    "m": "rad", "m/s": "rad/s", "m/s^2": "rad/s^2", "m/s^3": "rad/s^3", "m rms": "rad rms",
+    "N": "N m", "N^2": "(N m)^2", "kg": "kg m^2", "N s/m": "N m s/rad", "N/m": "N m/rad",
+    "N/m^2": "N m/rad^2", "N/m^3": "N m/rad^3", "N s^2/m^2": "N m s^2/rad^2", "N/A": "N m/A",
+    "N/s": "N m/s", "N/(m s)": "N m/(rad s)", "1/m": "1/rad", "1/N": "1/(N m)",
+    "s^2/m": "s^2/rad", "A rms": "A rms", "1": "1", "s": "s", "Hz": "Hz", "1/J": "1/J", "": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("linear", UNITS)
+def test_a_linear_unit_has_a_rotary_counterpart(linear: str) -> None:
+    assert (LINEAR(linear), ROTARY(linear)) == (linear, UNITS[linear])
+
+
+def test_no_unit_of_the_catalogue_keeps_a_length_a_force_or_a_mass() -> None:
+    for effect in CATALOGUE.values():
+        for p in effect.parameters:
+            told = ROTARY(p.unit)
+            rest = told.replace("N m", "").replace("kg m^2", "")
+            assert not set(re.findall(r"[A-Za-z]+", rest)) & {"m", "N", "kg"}, (effect.name, told)
+
+
+def test_words_have_a_rotary_counterpart_and_names_have_none() -> None:
+    said = "Force error, free-running position error; forces at two Positions of constant_force"
+    turned = "Torque error, free-running angle error; torques at two Angles of constant_force"
+    assert (LINEAR.words(said), ROTARY.words(said)) == (said, turned)
+    assert [units_of(u).kind for u in ("rad", "rad/s", "N m", "m", "s", None)] == (
+        ["rotary"] * 3 + ["linear"] * 3
+    )

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 import tomlkit
+from machines import CATALOGUE
 
-from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments.file import load_experiment, parse_experiment
 from twin.experiments.kinds import KINDS
@@ -24,7 +24,6 @@ from twin.model.file import load_model, models_folder, parse_model
 from twin.model.machine import Hardware
 from twin.schemas import FOLDER, written
 
-CATALOGUE = load_catalogue()
 WRONG: tuple[Any, ...] = (
     True, 0, -1, 1e300, math.nan, -math.inf, 10**400, "", "2.0", "x\n\x00", "a" * 300, [],
     [1.0, 2.0, 3.0], [True, "x"], {}, {"a": {"b": 1}}, {"": []}, [{"mass": 1}],

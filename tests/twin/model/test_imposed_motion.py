@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from machines import CATALOGUE
 
 from identify import workflow
 from twin.effect import Kind
-from twin.effects import Catalogue, load_catalogue
+from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log
 from twin.model.file import format_model, load_model, save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
-CATALOGUE = load_catalogue()
 RATE = 1000.0  # Hz
 YIELDS = {"Fc": 9e5, "sigma2": 2e5, "sigma0": 4e8}  # of a large damper
 

@@ -11,7 +11,7 @@ from axis_runs import effect
 from twin.errors import InputError
 from twin.model.file import load_model, models_folder
 from twin.model.machine import AxisModel, MachineModel
-from twin.mujoco.mjcf import Spring, attached_joint, machine_spec
+from twin.mujoco.mjcf import attached_joint, machine_spec
 
 PERIOD = 2e-4  # s
 STAGE = load_model("proton_xy")
@@ -30,27 +30,6 @@ def mass_felt(model: mujoco.MjModel, joint: str) -> float:
     mujoco.mj_fullM(model, data, whole)
     dof = model.joint(joint).dofadr[0]
     return float(whole[dof, dof])
-
-
-@pytest.mark.parametrize(("frequency", "ratio"), [(0.5, 0.0), (40.0, 0.6), (700.0, 0.05)])
-def test_a_step_decays_and_swings_as_the_exact_motion_does(frequency: float, ratio: float) -> None:
-    """The poles of MuJoCo's step are those of the oscillator over one period."""
-    spring = Spring.of(0.2, frequency, ratio, PERIOD)
-    k, c, h = spring.stiffness, spring.damping, PERIOD
-    kept = 1.0 / (1.0 + h * c)
-    step = np.array([[1.0 - h * h * k * kept, h * kept], [-h * k * kept, kept]])
-    omega = 2.0 * np.pi * frequency
-    pole = np.exp(h * omega * (-ratio + 1j * np.sqrt(1.0 - ratio**2)))
-    found = sorted(np.linalg.eigvals(step), key=lambda z: z.imag)
-    np.testing.assert_allclose(found, [pole.conj(), pole], atol=1e-7)
-
-
-@pytest.mark.parametrize(("frequency", "share"), [(2e3, 0.1), (1e5, 0.6)])
-def test_a_spring_beyond_the_sampling_rate_is_held_where_the_step_is_stable(frequency, share):
-    spring = Spring.of(share, frequency, 0.05, PERIOD)
-    assert spring.stiffness <= 2.0 * (1.0 - share) / PERIOD**2
-    limit = Spring.of(share, 1e9, 0.05, PERIOD)
-    assert spring == limit or frequency < 3.0 / (2.0 * np.pi * PERIOD)
 
 
 @pytest.mark.parametrize("recoils", [(0.6, 0.1), (0.2, 0.35)])

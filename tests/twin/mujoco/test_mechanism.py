@@ -1,4 +1,4 @@
-"""Momentum and bias force of a mechanism's bodies are those of MuJoCo's own inverse dynamics."""
+"""Bodies of a mechanism: those of MuJoCo's inverse dynamics; their inertia in a user's file."""
 
 import mujoco
 import numpy as np
@@ -7,6 +7,7 @@ from arms import ARM, COUPLED, JOINTS, MOTORS, SUMS
 
 from twin.errors import InputError
 from twin.mujoco.mechanism import mechanism_of
+from twin.mujoco.written import in_mjcf, inertial, with_inertial
 
 OWN = {joint: joint for joint in JOINTS}
 LOOSE = ARM.replace('name="elbow" axis="0 1 0"', 'name="elbow" type="ball"')
@@ -148,3 +149,71 @@ def test_what_cannot_be_an_axis_is_one_line(text, joints, said):
     with pytest.raises(InputError, match=said) as raised:
         mechanism_of(text, "arm.xml", joints)
     assert "\n" not in str(raised.value)
+
+
+# A body's inertia is written into the user's own file, and nothing else of it changes
+
+
+WRITTEN_JOINTS = {"one": "a", "two": "b"}
+FILE = """<mujoco>
+  <!-- <body name="lower"> once had <inertial mass="1"/> -->
+  <worldbody>
+    <body name="upper">
+      <joint name="a"/>
+      {upper}
+      <body name="lower" pos="0 0 -1">
+        <inertial pos="0 0 -0.5" mass="2" diaginertia="1 1 1"></inertial>
+        <!-- a hinge > -->
+        <joint name="b" axis="1 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+WRITTEN_OWN = '<inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/>'
+MASS, CENTRE = 2.5, np.array([0.1, 0.0, -0.4])
+INERTIA = np.array([[1.2, 0.1, 0.0], [0.1, 1.1, -0.05], [0.0, -0.05, 0.9]])
+ELEMENT = inertial(MASS, CENTRE, INERTIA)
+ABOUT = INERTIA + MASS * (CENTRE @ CENTRE * np.eye(3) - np.outer(CENTRE, CENTRE))
+WANTED = np.array([MASS, *(MASS * CENTRE), *ABOUT.diagonal(), *ABOUT[np.triu_indices(3, 1)]])
+
+
+def file(upper: str = WRITTEN_OWN) -> str:
+    return FILE.format(upper=upper)
+
+
+@pytest.mark.parametrize(
+    ("axis", "text", "old"),
+    [
+        ("one", file(), WRITTEN_OWN),
+        ("two", file(), '<inertial pos="0 0 -0.5" mass="2" diaginertia="1 1 1"></inertial>'),
+    ],
+)
+def test_an_element_is_replaced_and_all_else_stays(axis: str, text: str, old: str) -> None:
+    made = with_inertial(text, "arm.xml", WRITTEN_JOINTS, axis, ELEMENT, WANTED)
+    assert made == text.replace(old, ELEMENT)
+    model = mujoco.MjModel.from_xml_string(made)
+    body = model.jnt_bodyid[model.joint(WRITTEN_JOINTS[axis]).id]
+    np.testing.assert_allclose(model.body_mass[body], MASS)
+    np.testing.assert_allclose(model.body_ipos[body], CENTRE, atol=1e-9)
+
+
+def test_a_body_of_shapes_alone_gets_an_element() -> None:
+    text = file('<geom size="0.1" mass="3"/>')
+    made = with_inertial(text, "arm.xml", WRITTEN_JOINTS, "one", ELEMENT, WANTED)
+    assert made.replace(ELEMENT, "") == text
+
+
+def test_where_the_file_makes_another_inertia_of_it_is_one_line() -> None:
+    with pytest.raises(InputError, match="joint 'a' does not take its inertia from an inertial"):
+        with_inertial(file(), "arm.xml", WRITTEN_JOINTS, "one", ELEMENT, 1.1 * WANTED)
+
+
+def test_a_urdf_becomes_mjcf_first() -> None:
+    urdf = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="a" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    text = in_mjcf(urdf, "arm.urdf")
+    made = with_inertial(text, "arm.urdf", {"one": "a"}, "one", ELEMENT, WANTED)
+    assert ELEMENT in made

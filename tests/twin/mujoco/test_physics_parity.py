@@ -1,4 +1,4 @@
-"""MuJoCo and the reduced model give one answer; a held force moves a mass as Newton says."""
+"""MuJoCo and the reduced model give one answer, on either axis; a held force moves a mass."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_runs import BOTH, Stepper
-from effect_runs import CATALOGUE, with_all
+from constructed import two_waves
+from effect_runs import with_all
+from machines import CATALOGUE, PROTON
 
-from twin.core.loop import COMMAND_COLUMN, POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.effect import Effect
 from twin.experiments.named import simulate
-from twin.experiments.trajectory import Setpoint
 from twin.laws.trials import moderate
 from twin.logs import Log
-from twin.model.file import load_model
-from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.signals import Array
 from twin.simulator import MujocoSimulator, ReducedSimulator, run
 
 
@@ -27,7 +27,7 @@ def smooth(model: MachineModel) -> MachineModel:
     return model
 
 
-STAGE = smooth(load_model("proton_xy", CATALOGUE))
+STAGE = smooth(PROTON)
 
 
 def simulated(model: MachineModel, stage: Stepper, experiment: str) -> Log:
@@ -74,32 +74,39 @@ def test_both_simulations_agree_with_all_effects_on_both_axes(experiment: str) -
     require_parity(with_all(STAGE, np.random.default_rng(22)), experiment)
 
 
-def test_both_simulations_agree_without_a_mujoco_file() -> None:
-    model = replace(STAGE, mjcf=None, mjcf_name=None)
-    require_parity(with_all(model, np.random.default_rng(23)))
+SLIDE = AxisModel(4.0, Hardware(), (Fitted.at_start(CATALOGUE["lugre"], {"sigma2": 2.0}),))
+HEAVIER = replace(SLIDE, mass=7.0)
+OF_AXES = [e for e in CATALOGUE.values() if not e.of_joints]
 
 
+MOTION = ("position", "velocity", "acceleration")
+
+
+def turned(columns: Array) -> Array:
+    """Those of both axes exchanged."""
+    return np.ascontiguousarray(columns[:, ::-1])
+
+
+def signals(x: AxisModel, y: AxisModel, stage: Stepper, swapped: bool = False) -> Array:
+    """Of two axes that swing for 0.4 s, or of both exchanged."""
+    asked = two_waves(2000, 5000.0)
+    if swapped:
+        x, y = y, x
+        asked = replace(asked, **{n: turned(getattr(asked, n)) for n in MOTION})
+    model = MachineModel("slides", {"x": x, "y": y}, sample_rate=5000.0)
+    done = run(model, asked, np.random.default_rng(0), simulator=stage).signals
+    return done[:, ::-1] if swapped else done
+
+
+@pytest.mark.parametrize("effect", OF_AXES, ids=lambda e: e.name)
 @pytest.mark.parametrize("stage", BOTH)
-def test_true_position_is_the_closed_form_of_a_force_held_over_samples(stage: Stepper) -> None:
-    mass, rate, n, held = 3.7, 1000.0, 7000, 7
-    levels = np.random.default_rng(24).normal(0.0, 5.0, n // held)
-    force = np.repeat(levels, held)[:, None]
-    still = np.zeros_like(force)
-    done = run(
-        MachineModel("slide", {"x": AxisModel(mass)}, sample_rate=rate),
-        Setpoint(still, still, still, force, rate),
-        np.random.default_rng(0),
-        simulator=stage,
-        controllers={"x": Controller()},
-    ).signals[:, 0]
-
-    # Piecewise parabolas from one level to the next: exact, at samples between them too.
-    into = (np.arange(n) % held) / rate
-    a = np.repeat(levels, held) / mass
-    v0 = np.cumsum(np.r_[0.0, levels[:-1] * held / rate / mass])
-    x0 = np.cumsum(np.r_[0.0, (v0 * held / rate + levels / mass * (held / rate) ** 2 / 2)[:-1]])
-    v = np.repeat(v0, held) + a * into
-    x = np.repeat(x0, held) + np.repeat(v0, held) * into + a * into**2 / 2
-    np.testing.assert_array_equal(done[:, COMMAND_COLUMN], force[:, 0])
-    np.testing.assert_allclose(done[:, VELOCITY_COLUMN], v, rtol=0, atol=1e-12 * np.ptp(v))
-    np.testing.assert_allclose(done[:, POSITION_COLUMN], x, rtol=0, atol=1e-12 * np.ptp(x))
+def test_on_the_other_axis_an_effect_does_the_same(effect: Effect, stage: Stepper) -> None:
+    """Both axes exchange their effects, masses and setpoints, and with them their motion."""
+    drawn = [Fitted.at_start(effect, moderate(effect, np.random.default_rng(s))) for s in (1, 2)]
+    changed = SLIDE.with_effect(drawn[0])
+    for other in (HEAVIER, HEAVIER.with_effect(drawn[1])):
+        one = signals(changed, other, stage)
+        difference = np.abs(one - signals(changed, other, stage, swapped=True)).max(axis=(0, 1))
+        assert np.all(difference <= 1e-8 * np.abs(one).max(axis=(0, 1)))
+    without = signals(SLIDE, HEAVIER, stage)
+    assert np.abs(one[:, 0] - without[:, 0]).max() > 1e-9, "it does nothing"
