@@ -30,7 +30,7 @@ from identify.estimation.intervals import half_widths_by
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, least_t, part_of, taken
-from identify.selection.controls import Trial, unit_penalty
+from identify.selection.controls import ControlTest, unit_penalty
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import confidence
 from identify.selection.trying import NEARLY_ALL
@@ -341,14 +341,14 @@ class _Trial:
     """
 
     before: Mapping[str, Judged]
-    trial: Trial
+    trial: ControlTest
     resting: bool
 
     @classmethod
     def beside(cls, before: Mapping[str, Judged]) -> _Trial:
         """The trial beside fits by axis."""
         resting = any(sticks(judged.fit.axis) for judged in before.values())
-        return cls(before, Trial.together([*before.values()]), resting)
+        return cls(before, ControlTest.together([*before.values()]), resting)
 
     def forces(self, rival: _Rival, log: PreparedLog) -> Array:
         """Change (n, k) of what is left of a log by each parameter."""

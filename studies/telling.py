@@ -12,13 +12,13 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from identify.output.numbers import NOTHING, number, pretty, spaced
-from identify.output.report.page import Row, Table
+from identify.output.report.page import Row, TableBlock
 from studies.drawing import INK, Picture, new_figure, plain_tick
 
 HEIGHT = 2.2  # inches of a row of panels
 
 
-def tables(found: Any, name: str) -> Iterator[Table]:
+def tables(found: Any, name: str) -> Iterator[TableBlock]:
     """A table for each group of alike entries of an object of JSON; long columns are left out."""
     items = found if isinstance(found, Mapping) else dict(enumerate(found, 1))
     below = {key: one for key, one in items.items() if isinstance(one, Mapping | list)}
@@ -33,11 +33,11 @@ def tables(found: Any, name: str) -> Iterator[Table]:
         yield from tables(one, f"{name}, {spaced(str(key))}")
 
 
-def table(rows: Mapping[Any, Mapping[str, Any]], caption: str) -> Table:
+def table(rows: Mapping[Any, Mapping[str, Any]], caption: str) -> TableBlock:
     """Entries by row and column; a column without any entry is left out."""
     known = {k: None for row in rows.values() for k, v in row.items() if v is not None}
     cells = [Row([spaced(str(k)), *(_cell(row.get(c)) for c in known)]) for k, row in rows.items()]
-    return Table(["", *map(spaced, known)], cells, caption[:1].upper() + caption[1:])
+    return TableBlock(["", *map(spaced, known)], cells, caption[:1].upper() + caption[1:])
 
 
 def _cell(value: Any) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from built_fits import PLAIN, axis_of, built, built_dataset, built_fit, fitted, step
 
 from identify.dataset.dataset import Role
-from identify.estimation.confounded import Change, MovedParameter, Refit
+from identify.estimation.confounded import MovedParameter, ParameterShift, Refit
 from identify.estimation.fit import Errors, Outcome
 from identify.estimation.intervals import Estimate, NotExcited
 from identify.estimation.open_loop import Beginning
@@ -35,7 +35,7 @@ from identify.validation.agreement import AxisAgreement, Cause, Difference
 from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.tracking import AxisTracking, TrackingError
-from identify.validation.whiteness import Correlation, Loop, ResidualTests
+from identify.validation.whiteness import Correlation, Feedback, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.parameters import free_parameters, read, write
@@ -55,8 +55,10 @@ def estimates(offset: float) -> tuple[Estimate, ...]:
 
 
 def refit_of(offset: float) -> Refit:
-    first = Change("mass", 15.1 + offset, 15.7 + offset, "kg", 0.572 + offset, ("payload_mass",))
-    second = Change("cogging.a1", 0.113 + offset, 0.127 + offset, "N", 0.219 + offset)
+    first = ParameterShift(
+        "mass", 15.1 + offset, 15.7 + offset, "kg", 0.572 + offset, ("payload_mass",)
+    )
+    second = ParameterShift("cogging.a1", 0.113 + offset, 0.127 + offset, "N", 0.219 + offset)
     return Refit(0.913 + offset, 0.127 + 2 * offset, (first, second))
 
 
@@ -167,7 +169,7 @@ def whiteness_of(o: float = 0.0) -> ResidualTests:
     edges = np.linspace(-0.5, 0.5, 6) + o
     density = np.array([0.1, 0.9, 2.3, 1.1, 0.6]) + o
     made = tuple(correlation(n, o + i / 1e3) for i, n in enumerate(SIGNALS))
-    return ResidualTests(Loop.OPEN, 387, 0.0737 + o, edges, density, 0.883 - o, made)
+    return ResidualTests(Feedback.OPEN, 387, 0.0737 + o, edges, density, 0.883 - o, made)
 
 
 def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:

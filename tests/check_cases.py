@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 
-from twin.checks import CheckReport, Fault, Finding
+from twin.checks import CheckReport, Fault, LogFinding
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
 from twin.logs import Log
@@ -34,7 +34,7 @@ def with_axis(log: Log, name: str, change: Callable[[Columns], Mapping[str, Arra
     return replace(log, axes={name: replace(axis, columns=columns)})
 
 
-def only(report: CheckReport, fault: Fault) -> Finding:
+def only(report: CheckReport, fault: Fault) -> LogFinding:
     """The one finding of that kind."""
     found = [f for f in report.findings if f.fault is fault]
     assert len(found) == 1, [str(f) for f in report.findings]
@@ -46,7 +46,7 @@ def faults(report: CheckReport) -> set[Fault]:
     return {f.fault for f in report.findings}
 
 
-def milliseconds(finding: Finding) -> float:
+def milliseconds(finding: LogFinding) -> float:
     """The lag that is stated, positive where the signal is behind."""
     words = finding.what.split()
     return float(words[words.index("ms") - 1]) * (1.0 if "behind" in words else -1.0)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from twin.checks import Fault, Finding, check_log
+from twin.checks import Fault, LogFinding, check_log
 from twin.checks.axis import Axis
 from twin.logs import LINEAR_UNITS, AxisLog, Log
 from twin.logs.log import Array
@@ -60,11 +60,11 @@ def axis_of(log: Log) -> Axis:
     return Axis("x", log.sample_rate, log.axes["x"])
 
 
-def findings(log: Log, fault: Fault) -> list[Finding]:
+def findings(log: Log, fault: Fault) -> list[LogFinding]:
     """What is found of one kind of fault."""
     return [f for f in check_log(log).findings if f.fault is fault]
 
 
-def stated(finding: Finding, words: str) -> float:
+def stated(finding: LogFinding, words: str) -> float:
     """The number behind these words."""
     return float(finding.what.partition(words)[2].split()[0])

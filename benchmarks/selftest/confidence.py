@@ -20,7 +20,7 @@ from benchmarks.selftest.design import DEVELOPMENT, FULL, run_all
 from benchmarks.selftest.tally import answers_of
 from benchmarks.selftest.trial import Answer, TrialResult
 from benchmarks.selftest.words import tell
-from identify.selection.findings import FindingKind, Level, read
+from identify.selection.findings import ConfidenceBin, FindingKind, read
 
 LEAST_ANSWERS = 100  # to a level: a rate of them is known to some 5 points
 SPLIT = 1  # seed of the halves
@@ -61,7 +61,7 @@ Figure = Callable[[Answer], float]
 FIGURES: dict[str, Figure] = {"BY_PART": lambda a: a.part, "BY_T": lambda a: a.t}
 
 
-def levels(answers: Sequence[Answer], figure: Figure) -> tuple[Level, ...]:
+def levels(answers: Sequence[Answer], figure: Figure) -> tuple[ConfidenceBin, ...]:
     """How often answers were right by a figure of their score: a falling staircase of a few levels.
 
     Levels hold equally many answers, at least LEAST_ANSWERS; one that is not below the one before
@@ -78,7 +78,7 @@ def levels(answers: Sequence[Answer], figure: Figure) -> tuple[Level, ...]:
             last = pooled.pop()
             pooled[-1] += last
     ends = [figure(group[-1]) for group in pooled[:-1]] + [0.0]
-    return tuple(Level(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
+    return tuple(ConfidenceBin(end, _rate(part)) for end, part in zip(ends, pooled, strict=True))
 
 
 def _rate(answers: Sequence[Answer]) -> float:

@@ -171,7 +171,7 @@ FIRST, EVERY = 5.0, 10.0  # s until the first line, and from one to the next
 
 
 @dataclass(frozen=True)
-class Part:
+class Progressed:
     """Part of a command's work. first: how much of it was done when it began, at ``begun`` (s)."""
 
     what: str
@@ -212,12 +212,14 @@ class Shown:
 
     def __init__(self) -> None:
         self.begun = monotonic()
-        self.part = Part("starting", 0, 0, 0, self.begun)
+        self.part = Progressed("starting", 0, 0, 0, self.begun)
 
     def __call__(self, what: str, done: int, total: int) -> None:
         same = what == self.part.what and total == self.part.total and done > self.part.done
         now = monotonic()
-        self.part = replace(self.part, done=done) if same else Part(what, done, total, done, now)
+        self.part = (
+            replace(self.part, done=done) if same else Progressed(what, done, total, done, now)
+        )
 
     def __str__(self) -> str:
         now = monotonic()

@@ -28,7 +28,7 @@ Motions = Sequence[Motion]
 
 
 @dataclass(frozen=True)
-class Scale:
+class AtLength:
     """What shows at one length: N RMS of the force that a mass, friction and a constant leave.
 
     floor: N RMS, what noise alone leaves.
@@ -43,14 +43,14 @@ class Scale:
         """N RMS of what is left beyond noise."""
         return float(np.sqrt(max(self.left**2 - self.floor**2, 0.0)))
 
-    def shows_more_than(self, quiet: Scale) -> bool:
+    def shows_more_than(self, quiet: AtLength) -> bool:
         """Whether it holds a force, sure beside its noise, that a quieter scale hides."""
         # times the noise floor, and the power at a quiet length, from which a force shows
         shows = 2.0
         return self.left > shows * self.floor and self.structure**2 > shows * quiet.structure**2
 
     @classmethod
-    def of(cls, length: float, motions: Motions) -> Scale:
+    def of(cls, length: float, motions: Motions) -> AtLength:
         columns, forces, test_functions = regressors(motions, length)
         gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
         left = forces - columns.T @ gains
@@ -72,12 +72,12 @@ def choose_length(
     shorter = [length for length in TEST_FUNCTIONS if length < chosen]
     if imposed or not shorter:
         return chosen
-    quiet = Scale.of(chosen, motions)
+    quiet = AtLength.of(chosen, motions)
     for length in shorter:
         finer = motions_at(length)[0]
         if length < LEAST_BLOCKS * max(m.period for m in finer):
             continue
-        if Scale.of(length, finer).shows_more_than(quiet):
+        if AtLength.of(length, finer).shows_more_than(quiet):
             return length
     return chosen
 

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterShift:
     """A parameter that a fit moved by more than its interval.
 
     before, after: in ``unit``. force: RMS force that the change makes, in ``force_unit``. alike:
@@ -52,7 +52,7 @@ class Refit:
 
     given: float
     refitted: float
-    changes: tuple[Change, ...]
+    changes: tuple[ParameterShift, ...]
     unit: str = LINEAR.force
 
 
@@ -72,7 +72,7 @@ def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:
     told = []
     for (force, j, _), names in zip(found, alike, strict=True):
         unit, values = units(where[j].parameter.unit), (float(before[j]), float(after[j]))
-        told.append(Change(where[j].label, *values, unit, force, names, units.force))
+        told.append(ParameterShift(where[j].label, *values, unit, force, names, units.force))
     return Refit(error, fit.error, tuple(told), units.force)
 
 

@@ -133,7 +133,7 @@ def simulated_error(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
 
 def motion_error(axis: AxisModel, log: PreparedLog, beginning: Beginning | None = None) -> Array:
     """Simulated less measured position (n,) m of one log; begun as measured where None."""
-    return Replay(axis, log).error(axis, beginning or measured_beginning(axis, log)[0])
+    return OpenLoopRun(axis, log).error(axis, beginning or measured_beginning(axis, log)[0])
 
 
 def measured_beginning(axis: AxisModel, log: PreparedLog) -> tuple[Beginning, Array]:
@@ -142,7 +142,7 @@ def measured_beginning(axis: AxisModel, log: PreparedLog) -> tuple[Beginning, Ar
     As standard deviations: of position m and velocity m/s by the noise of the readings, and of each
     state of the friction by its usual size along the measured motion; 0 for a state that is known.
     """
-    run = Replay(axis, log)
+    run = OpenLoopRun(axis, log)
     table, position, period = run.model.table(), run.position, log.motion.sample_period
     side = run.first
     reading = max(log.motion.position_noise, log.motion.resolution / 12**0.5, LEAST_READING)
@@ -167,7 +167,7 @@ def _of_friction(axis: AxisModel, table: Table) -> NDArray[np.bool_]:
     return out
 
 
-class Replay:
+class OpenLoopRun:
     """One log to be simulated again and again on one axis."""
 
     def __init__(self, axis: AxisModel, log: PreparedLog) -> None:

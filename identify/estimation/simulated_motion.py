@@ -27,7 +27,7 @@ from identify.estimation.least_squares import MOST_EVALUATIONS, Solution, minimi
 from identify.estimation.open_loop import (
     LEAST_READING,
     Beginning,
-    Replay,
+    OpenLoopRun,
     measured_beginning,
     motion_error,
     simulated_error,
@@ -122,7 +122,7 @@ class _Problem:
         _require_alone(axis, logs)
         self.axis, self.logs = axis, logs
         self.scaling = Scaling.of(axis, logs)
-        self.runs = [Replay(axis, log) for log in logs]
+        self.runs = [OpenLoopRun(axis, log) for log in logs]
         self.measured, self.surely = zip(
             *(measured_beginning(axis, log) for log in logs), strict=True
         )

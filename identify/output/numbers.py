@@ -27,14 +27,14 @@ _MINUS = re.compile(r"(?<![\w.)])-(?=\d|∞)")
 
 
 @dataclass(frozen=True)
-class Scale:
+class DisplayUnit:
     """A unit to print in: SI values divided by ``size`` are in ``unit``."""
 
     size: float
     unit: str
 
     @classmethod
-    def of(cls, unit: str, values: ArrayLike) -> Scale:
+    def of(cls, unit: str, values: ArrayLike) -> DisplayUnit:
         """The unit in which the largest of these SI values is 0.5 or more, e.g. mN for 0.02 N."""
         finite = np.abs(np.asarray(values, dtype=float))
         largest = np.max(finite[np.isfinite(finite)], initial=0.0)
@@ -73,26 +73,26 @@ class Scale:
 
 def quantity(value: float | None, unit: str) -> str:
     """One SI value in the unit that suits it, e.g. "27.0 mm"."""
-    return Scale.of(unit, [0.0 if value is None else value]).text(value)
+    return DisplayUnit.of(unit, [0.0 if value is None else value]).text(value)
 
 
 def with_band(value: float, band: float, unit: str) -> str:
     """A SI value with half its 90 % band, in the unit that suits it, e.g. "15.00 ± 0.02 kg"."""
-    scale = Scale.of(unit, [value, band])
+    scale = DisplayUnit.of(unit, [value, band])
     first, second = scale.within(value - band, value + band, value, band)
     return f"{first} ± {second} {scale.unit}".rstrip()
 
 
 def span(low: float, high: float, unit: str) -> str:
     """Two SI values in the unit that suits them, e.g. "12.0 and 26.0 mm"."""
-    scale = Scale.of(unit, [low, high])
+    scale = DisplayUnit.of(unit, [low, high])
     first, second = scale.within(low, high, low, high)
     return f"{first} and {second} {scale.unit}".rstrip()
 
 
-def change(before: float, after: float, unit: str | Scale) -> tuple[str, str]:
+def change(before: float, after: float, unit: str | DisplayUnit) -> tuple[str, str]:
     """Two SI values in one unit, with digits that tell them apart; the second has the unit."""
-    scale = unit if isinstance(unit, Scale) else Scale.of(unit, [before, after])
+    scale = unit if isinstance(unit, DisplayUnit) else DisplayUnit.of(unit, [before, after])
     pair, digits = (before / scale.size, after / scale.size), DIGITS
     while number(pair[0], digits) == number(pair[1], digits) and before != after and digits < 15:
         digits += 1

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
-from identify.output.numbers import Scale, arrow, change, number, quantity
+from identify.output.numbers import DisplayUnit, arrow, change, number, quantity
 from identify.output.words.diagnosis import (
     all_found,
     named_in_words,
@@ -99,7 +99,7 @@ def simulation_fit_text(result: SimulationFit) -> str:
         said = motion_fit_in_words(axis, fit, result.holdout_error[axis])
         lines += [said[0], *(f"  {line}" for line in said[1:])]
         for c, before, now in refitted(fit):
-            scale = Scale.of(fit.axis.units(c.parameter.unit), [now])
+            scale = DisplayUnit.of(fit.axis.units(c.parameter.unit), [now])
             value = f"{number(now / scale.size, 6)} {scale.unit}".rstrip()
             lines.append(f"  {c.label:34s} {value} (force fit {number(before / scale.size, 6)})")
     return "\n".join(lines)
@@ -187,7 +187,7 @@ def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
     why = why_not(found, c)
     if c.score is None:
         return f"  {c.effect.name:28s} not refitted: {why}"
-    scale = Scale.of(c.fit.axis.units.force, c.gain.before)
+    scale = DisplayUnit.of(c.fit.axis.units.force, c.gain.before)
     errors = " -> ".join(change(c.gain.before, c.gain.after, scale))
     return f"  {c.effect.name:28s} {c.delta_bic:10.1f}   {errors}   {why}".rstrip()
 
@@ -221,7 +221,7 @@ def add_text(result: Addition) -> str:
         lines.append(f"  {what:33s} {arrow(before, after, step.unit)}")
     if result.position_error is not None and result.replayed is not None:
         unit = result.units.position
-        scale = Scale.of(unit, result.position_error)
+        scale = DisplayUnit.of(unit, result.position_error)
         lines.append(
             f"  {words('free-running position error'):33s} {arrow(*result.position_error, unit)} "
             f"on {result.position_log} (MuJoCo: {scale.text(result.replayed)})"

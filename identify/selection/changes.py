@@ -24,7 +24,7 @@ from identify.estimation.free_curves import Shape, columns_of, shapes_of, sticki
 from identify.estimation.variable_projection import Start, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
-from identify.selection.controls import Trial, change_of, with_unit_penalty
+from identify.selection.controls import ControlTest, change_of, with_unit_penalty
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted
@@ -58,7 +58,7 @@ class Change(Protocol):
     def effect(self) -> Effect:
         """The effect that it adds or changes; of a free curve the curve itself."""
 
-    def screen(self, judged: Judged, trial: Trial) -> Screening:
+    def screen(self, judged: Judged, trial: ControlTest) -> Screening:
         """One linear step beside a fit."""
 
     def refit(self, judged: Judged, screening: Screening) -> Fit:
@@ -81,7 +81,7 @@ class Added:
     def name(self) -> str:
         return self.effect.name
 
-    def screen(self, judged: Judged, trial: Trial) -> Screening:
+    def screen(self, judged: Judged, trial: ControlTest) -> Screening:
         fit, dataset = judged.fit, judged.dataset
         found = starts(fit, dataset, self.effect)
         if self.effect.kind is Kind.FRICTION:
@@ -149,7 +149,7 @@ class Freed:
         law = axis[self.name]
         return axis.with_effect(replace(law, fixed=law.fixed - {self.parameter}))
 
-    def screen(self, judged: Judged, trial: Trial) -> Screening:
+    def screen(self, judged: Judged, trial: ControlTest) -> Screening:
         """By the change of the residual at two other values: the law bends between them."""
         axis, free = judged.fit.axis, self.free(judged.fit.axis)
         law = free[self.name]
@@ -193,7 +193,7 @@ class Reshaped:
     def effect(self) -> Effect:
         return self.shape.empty.effect
 
-    def screen(self, judged: Judged, trial: Trial) -> Screening:
+    def screen(self, judged: Judged, trial: ControlTest) -> Screening:
         columns, resting = self.columns(judged, judged)
         return Screening(self, trial.part(columns, sticking=resting))
 
@@ -232,7 +232,7 @@ def reshaped_of(fit: Fit, dataset: Dataset) -> list[Reshaped]:
 def control(change: Change, without: Judged, fit: Judged) -> float:
     """The part that a change's controls take beside a fit without it (``controls``)."""
     columns, resting = change.columns(without, fit)
-    return Trial.beside(without).control(columns, sticking=resting)
+    return ControlTest.beside(without).control(columns, sticking=resting)
 
 
 def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:

@@ -34,7 +34,7 @@ TINY = np.finfo(float).tiny  # of what is nothing, as a column where the motion 
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ControlTest:
     """A fit beside which columns are tried, on its own logs and on those that it was not fitted to.
 
     other: None where blocks of the training logs are left out instead. quiet, other_quiet: squared
@@ -48,7 +48,7 @@ class Trial:
 
     @classmethod
     @lru_cache(maxsize=2)  # every change is tried beside the same fit, and its controls again
-    def beside(cls, judged: Judged) -> Trial:
+    def beside(cls, judged: Judged) -> ControlTest:
         """The trial beside a fit."""
         fit, holdout = judged.fit, judged.dataset.holdout
         size = unit_penalty(fit.jacobian)
@@ -61,7 +61,7 @@ class Trial:
         return cls(own, _Part(holdout, force, columns, kept), fit.floor**2, judged.other_floor**2)
 
     @classmethod
-    def together(cls, several: Sequence[Judged]) -> Trial:
+    def together(cls, several: Sequence[Judged]) -> ControlTest:
         """The trial beside fits of several axes, each force in units of its own noise floor."""
 
         def stacked(parts: Sequence[_Part], floors: Sequence[float]) -> _Part:
@@ -143,7 +143,7 @@ def with_unit_penalty(columns: Columns, fit: Fit) -> Columns:
 def change_control(before: Judged, after: Judged) -> float:
     """The part that the controls of a change take that is only known by what it does."""
     resting = sticks(before.fit.axis) or sticks(after.fit.axis)
-    return Trial.beside(before).control(change_of(before, after), sticking=resting)
+    return ControlTest.beside(before).control(change_of(before, after), sticking=resting)
 
 
 def unit_penalty(columns: Array) -> Array:

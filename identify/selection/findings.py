@@ -31,7 +31,7 @@ from twin.threads import trim_memory
 
 
 @dataclass(frozen=True)
-class Level:
+class ConfidenceBin:
     """From which value on answers were right how often, 0..1."""
 
     least: float
@@ -44,20 +44,20 @@ class Level:
 # (right + 1)/(answers + 2), and 0.99 at most; with t from 3 on 0.93 of all, but of machines that
 # are not the self-test's 33 of 38 up to a t of 4: hence 0.89. Below 2.2 it is that of 30 answers.
 BY_PART = (
-    Level(0.97, 0.99),
-    Level(0.86, 0.98),
-    Level(0.73, 0.94),
-    Level(0.51, 0.91),
-    Level(0.0, 0.82),
+    ConfidenceBin(0.97, 0.99),
+    ConfidenceBin(0.86, 0.98),
+    ConfidenceBin(0.73, 0.94),
+    ConfidenceBin(0.51, 0.91),
+    ConfidenceBin(0.0, 0.82),
 )
 BY_T = (
-    Level(6.9, 0.99),
-    Level(5.4, 0.98),
-    Level(4.6, 0.96),
-    Level(3.8, 0.95),
-    Level(3.0, 0.89),
-    Level(2.2, 0.82),
-    Level(0.0, 0.75),
+    ConfidenceBin(6.9, 0.99),
+    ConfidenceBin(5.4, 0.98),
+    ConfidenceBin(4.6, 0.96),
+    ConfidenceBin(3.8, 0.95),
+    ConfidenceBin(3.0, 0.89),
+    ConfidenceBin(2.2, 0.82),
+    ConfidenceBin(0.0, 0.75),
 )
 
 
@@ -66,7 +66,7 @@ def confidence(part: float, t: float) -> float:
     return min(read(BY_PART, part), read(BY_T, t))
 
 
-def read(table: Sequence[Level], value: float) -> float:
+def read(table: Sequence[ConfidenceBin], value: float) -> float:
     """The rate of the level that a value reaches."""
     return next((level.right for level in table if value >= level.least), table[-1].right)
 

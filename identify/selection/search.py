@@ -31,7 +31,7 @@ from identify.selection.changes import (
     freed_of,
     in_simplest_values,
 )
-from identify.selection.controls import Trial
+from identify.selection.controls import ControlTest
 from identify.selection.trying import (
     LEADERS,
     Tried,
@@ -117,7 +117,7 @@ def _forget(fits: Iterable[Fit]) -> None:
     """Let go of the matrices of fits that nobody needs beside those of others."""
     for fit in fits:
         fit.forget()
-    for known in (Trial.beside, basis_beside):
+    for known in (ControlTest.beside, basis_beside):
         known.cache_clear()
     trim_memory()
 

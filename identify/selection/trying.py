@@ -30,7 +30,7 @@ from identify.selection.changes import (
     from_all_starts,
     reshaped_of,
 )
-from identify.selection.controls import Trial
+from identify.selection.controls import ControlTest
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -72,7 +72,7 @@ def tried_beside(
     changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
     if judged.at_floor:
         changes = []
-    trial = Trial.beside(judged)
+    trial = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")
     screenings = spread(lambda c: c.screen(judged, trial), changes, trying)
     tried = _refitted(judged, screenings, len({e.kind for e in effects}), progress)
@@ -228,7 +228,7 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     before, change = Judged(base, dataset), Added(effect)
     if effect.is_noise:
         return as_noise(before, effect).candidate
-    screening = change.screen(before, Trial.beside(before))
+    screening = change.screen(before, ControlTest.beside(before))
     fit = change.refit(before, screening)
     if not fit.at_floor:
         fit = fit_multistart(from_all_starts(before, screening, fit).axis, dataset, base.begun)
@@ -245,7 +245,7 @@ def reshape(
     tried = []
     for name, fit in fits.items():
         before = Judged(fit, prepared[name])
-        trial = Trial.beside(before)
+        trial = ControlTest.beside(before)
         for shape in shapes_of(fit, before.dataset, effect.name):
             change = Reshaped(shape, fit.axis[effect.name])
             screening = change.screen(before, trial)

@@ -24,7 +24,7 @@ NORMAL = NormalDist()
 WITHIN = 0.90  # part of a white residual's correlations within the bounds
 
 
-class Loop(Enum):
+class Feedback(Enum):
     """Whether the logs were recorded under feedback."""
 
     CLOSED = "closed"
@@ -66,7 +66,7 @@ class ResidualTests:
     the histogram. within: part of the samples within 1.645 noise floors, 0.9 for pure noise.
     """
 
-    loop: Loop
+    loop: Feedback
     samples: int
     floor: float
     edges: Array
@@ -80,19 +80,19 @@ class ResidualTests:
         return all(c.passes for c in self.correlations)
 
 
-def loop_of(logs: Sequence[PreparedLog]) -> Loop:
+def loop_of(logs: Sequence[PreparedLog]) -> Feedback:
     """Whether an axis was under feedback: closed where its position follows a logged setpoint.
 
     Open where a logged setpoint is not followed in any log; unknown where one was not logged.
     """
     found = [log.motion.follows for log in logs]
     if any(follows is None for follows in found):
-        return Loop.UNKNOWN
-    return Loop.CLOSED if any(found) else Loop.OPEN
+        return Feedback.UNKNOWN
+    return Feedback.CLOSED if any(found) else Feedback.OPEN
 
 
 def residual_tests(
-    logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Loop
+    logs: Sequence[PreparedLog], force: Array, kept: NDArray[np.bool_], floor: float, loop: Feedback
 ) -> ResidualTests:
     """Tests of the force residual (n,) N of some logs; kept (n,): which values are used."""
     # From one test function to the next that does not overlap with it.
@@ -128,7 +128,7 @@ def residual_tests(
 
 
 def correlation(
-    signal: str, residual: Sequence[Array], other: Sequence[Array], spacing: float, loop: Loop
+    signal: str, residual: Sequence[Array], other: Sequence[Array], spacing: float, loop: Feedback
 ) -> Correlation:
     """Correlation of residual and signal, log by log (n_i,) each; nan values are left out.
 
@@ -143,7 +143,7 @@ def correlation(
     power = np.sqrt(sum(np.sum(row**2) for row in a) * sum(np.sum(row**2) for row in b))
     products = sum(_products(x, y, lags) for x, y in zip(a, b, strict=True))
     tested = np.ones(len(lags), bool)
-    if not own and loop is not Loop.OPEN:
+    if not own and loop is not Feedback.OPEN:
         tested = lags > 0  # under feedback the command of the same instant depends on the noise
     count = int(tested.sum())
     root = np.sqrt(max(n, 1))

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 
-from identify.output.numbers import Scale, quantity
+from identify.output.numbers import DisplayUnit, quantity
 from identify.view.replay import Replay
 from twin.errors import InputError
 from twin.files import write_atomically
@@ -70,7 +70,7 @@ def strips(replay: Replay, wide: int, tall: int) -> Pixels:
     figure = Figure(figsize=(wide / 100, tall / 100), dpi=100)
     for i, (name, strip) in enumerate(named):
         axes = figure.add_axes((0.0, 1.0 - (i + 1) / len(named), 1.0, 0.72 / len(named)))
-        scale = Scale.of(strip.unit, strip.range)
+        scale = DisplayUnit.of(strip.unit, strip.range)
         low, high = scale(strip.range)
         axes.fill_between(np.arange(len(low)), low, high, color="#b4541a", lw=0.8)
         axes.set_xlim(0, len(low) - 1)

@@ -25,7 +25,7 @@ from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import force_along
 from identify.estimation.intervals import half_widths
-from identify.estimation.open_loop import Beginning, Replay, measured_beginning
+from identify.estimation.open_loop import Beginning, OpenLoopRun, measured_beginning
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
@@ -104,7 +104,7 @@ def at_place(
     between = perf_counter()
     fit = fit_dynamic_part(known, logs, rng)
     seconds = np.array([between - start, perf_counter() - between])
-    replay, begun, period = Replay(fit.axis, log), fit.beginnings[0], log.motion.sample_period
+    replay, begun, period = OpenLoopRun(fit.axis, log), fit.beginnings[0], log.motion.sample_period
     errors = np.array([replay.error(fit.axis, b) for b in (at_rest(fit.axis, log), begun)])
     measured = log.motion.position_at_samples(0.0)[begun.first :]
     time, cut = (begun.first + np.arange(len(measured))) * period, round(PERIOD / period)
@@ -135,7 +135,7 @@ def late(log: Log, name: str) -> Log:
 
 def by_simplex(axis: AxisModel, log: PreparedLog, rng: np.random.Generator) -> Array:
     """Stiffness and damping by the thesis's search and start rules, simulated from rest."""
-    where, replay, begin = free_parameters(axis), Replay(axis, log), at_rest(axis, log)
+    where, replay, begin = free_parameters(axis), OpenLoopRun(axis, log), at_rest(axis, log)
     stiffness = friction_of(axis).values["Fs"] / (np.ptp(replay.position) / 2.0)
     found = minimize(
         lambda x: rms(replay.error(write(axis, where, x), begin)),

@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.output.answers import plain
 from identify.output.numbers import capitalised
-from identify.output.report.page import Answer, Section, Tone, page
+from identify.output.report.page import AnswerBlock, Section, Tone, page
 from studies.drawing import drawing_style
 from studies.telling import tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
@@ -71,7 +71,7 @@ class Reproduction:
 
 def _section(name: str, found: Found) -> Section:
     title, words = CHAPTERS[name].TITLE, [capitalised(said) for said in found.words]
-    answer = Answer(title, words[0], [], words[1:], Tone.STRONG)
+    answer = AnswerBlock(title, words[0], [], words[1:], Tone.STRONG)
     return Section(name, title, [answer, *found.pictures, *tables(plain(found.numbers), name)])
 
 

@@ -18,7 +18,7 @@ import pytest
 from planted_logs import SLIDE, Ride, begun, few, having, logged
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from identify.cli.command import Part, roughly
+from identify.cli.command import Progressed, roughly
 from identify.selection.diagnosis import diagnose_axis
 from twin.logs import AxisLog, Log, write_log
 from twin.parallel import within
@@ -304,14 +304,16 @@ def test_a_search_counts_the_changes_of_each_step() -> None:
 
 
 def test_the_time_left_is_by_what_was_done_since_the_part_began() -> None:
-    at = Part("p", 30, 50, first=10, begun=100.0)
+    at = Progressed("p", 30, 50, first=10, begun=100.0)
     assert at.left(140.0) == pytest.approx(40.0)
     assert at.words(140.0) == "p: 30 of 50, about 40 s left of this part"
-    for none in (Part("p", 10, 50, 10, 100.0), Part("p", 50, 50, 10, 100.0)):
+    for none in (Progressed("p", 10, 50, 10, 100.0), Progressed("p", 50, 50, 10, 100.0)):
         assert none.left(140.0) is None
         assert none.words(140.0) == f"p: {none.done} of 50"
-    assert Part("p", 0, 1, 0, 100.0).words(140.0) == "p"
-    assert Part("p", 1500, 6000, 0, 0.0).words(60.0) == "p: 25 %, about 3 min left of this part"
+    assert Progressed("p", 0, 1, 0, 100.0).words(140.0) == "p"
+    assert (
+        Progressed("p", 1500, 6000, 0, 0.0).words(60.0) == "p: 25 %, about 3 min left of this part"
+    )
 
 
 @pytest.mark.parametrize(

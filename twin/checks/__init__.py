@@ -16,7 +16,7 @@ from twin.checks.content import (
     check_excitation,
     check_saturation,
 )
-from twin.checks.report import CheckReport, Fault, Finding, Severity
+from twin.checks.report import CheckReport, Fault, LogFinding, Severity
 from twin.logs.log import Log
 
 __all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_assumed", "check_log", "moves"]
@@ -37,7 +37,7 @@ def check_log(log: Log) -> CheckReport:
 
     Where an axis lacks something that every other check needs, only that is reported.
     """
-    findings: list[Finding] = []
+    findings: list[LogFinding] = []
     sound: list[Axis] = []
     for name, columns in log.axes.items():
         axis = Axis(name, log.sample_rate, columns)

@@ -18,7 +18,7 @@ from twin.checks.explain import (
     find_trend,
     fit_dynamics,
 )
-from twin.checks.report import WHOLE, Fault, Finding, Severity
+from twin.checks.report import WHOLE, Fault, LogFinding, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, median, stretches, usual_size, white_noise
 
@@ -34,13 +34,13 @@ class Axis:
     sample_rate: float
     log: AxisLog
 
-    def error(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> Finding:
+    def error(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> LogFinding:
         """A fault for which the log should not be fitted."""
-        return Finding(Severity.ERROR, fault, self.name, what, where, remedy)
+        return LogFinding(Severity.ERROR, fault, self.name, what, where, remedy)
 
-    def warning(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> Finding:
+    def warning(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> LogFinding:
         """A fault that limits what a fit can identify."""
-        return Finding(Severity.WARNING, fault, self.name, what, where, remedy)
+        return LogFinding(Severity.WARNING, fault, self.name, what, where, remedy)
 
     @property
     def duration(self) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from twin.checks.axis import Axis
 from twin.checks.explain import UNUSUAL, contradicted
-from twin.checks.report import Fault, Finding
+from twin.checks.report import Fault, LogFinding
 from twin.signals import Array, stretches
 
 CLUSTER = 3  # samples between two jumps of one break
@@ -37,7 +37,7 @@ class Break:
     step: float = 0.0
 
 
-def check_breaks(axis: Axis) -> Iterator[Finding]:
+def check_breaks(axis: Axis) -> Iterator[LogFinding]:
     """What breaks the position, each kind once."""
     if count := axis.position_held:
         yield held(axis, "the position", count)
@@ -150,7 +150,7 @@ def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | Non
     return float(x[end] - x[begin]) - expected, before, after
 
 
-def _finding(axis: Axis, fault: Fault, found: list[Break]) -> Finding:
+def _finding(axis: Axis, fault: Fault, found: list[Break]) -> LogFinding:
     first, largest = found[0], max(found, key=lambda b: abs(b.size))
     size = f"{abs(largest.size):.3g} {axis.log.units['position']}"
     still = (first.last - first.first) / axis.sample_rate
@@ -194,7 +194,7 @@ def uneven_curvature(axis: Axis) -> NDArray[np.intp]:
     return curved if everywhere else curved[:0]
 
 
-def held(axis: Axis, name: str, count: int) -> Finding:
+def held(axis: Axis, name: str, count: int) -> LogFinding:
     """A signal that is held for ``count`` samples."""
     rate = axis.sample_rate / count
     what = f"{name} changes at every {count}th sample only: it was sampled at {rate:g} Hz and held"
@@ -202,7 +202,7 @@ def held(axis: Axis, name: str, count: int) -> Finding:
     return axis.warning(Fault.HELD, what, remedy)
 
 
-def check_outliers(axis: Axis) -> Iterator[Finding]:
+def check_outliers(axis: Axis) -> Iterator[LogFinding]:
     """Outliers in position and command."""
     unexplained = not axis.position_held and not len(uneven_curvature(axis))
     jumps = _outside(find_breaks(axis), axis.curved_at)
@@ -240,7 +240,7 @@ def _rough_command(axis: Axis) -> Array:
     return (np.flatnonzero(rough & dense) + 1) / axis.sample_rate
 
 
-def _contradictions(axis: Axis) -> Iterator[Finding]:
+def _contradictions(axis: Axis) -> Iterator[LogFinding]:
     """Where command and motion contradict each other, except at jumps of the position."""
     fit = axis.dynamics
     if not fit.explains:
@@ -256,7 +256,7 @@ def _contradictions(axis: Axis) -> Iterator[Finding]:
         yield _outliers(axis, axis.smoother.time(bad + fit.first), what)
 
 
-def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> Finding:
+def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> LogFinding:
     bursts_apart = 0.05  # s without an outlier ends a burst
     bursts = np.split(times, np.flatnonzero(np.diff(times) > bursts_apart) + 1)
     where = f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{and_more(len(bursts))}"

@@ -8,14 +8,14 @@ import numpy as np
 
 from twin.checks.axis import PHYSICAL, READINGS, Axis
 from twin.checks.explain import fit_dynamics
-from twin.checks.report import Fault, Finding
+from twin.checks.report import Fault, LogFinding
 from twin.signals import Array
 
 CAUSED = "the motion that it causes"
 DEAD_TIME = ", unless the drive has that dead time"
 
 
-def check_timing(axis: Axis) -> Iterator[Finding]:
+def check_timing(axis: Axis) -> Iterator[LogFinding]:
     """Command, measured velocity and setpoint against the position."""
     if not axis.moves:
         return
@@ -48,7 +48,7 @@ def check_timing(axis: Axis) -> Iterator[Finding]:
                                                     "setpoint_position"))  # fmt: skip
 
 
-def _steady(axis: Axis) -> Iterator[Finding]:
+def _steady(axis: Axis) -> Iterator[LogFinding]:
     """A lag or a drift too small to be seen at once, but the same in all parts of the log."""
     sure_lag = 5.0  # times its error, that a lag or a drift must be
     trend = axis.trend
@@ -108,7 +108,7 @@ _SLIPS: Mapping[float, str] = {
 }
 
 
-def check_units(axis: Axis) -> Iterator[Finding]:
+def check_units(axis: Axis) -> Iterator[LogFinding]:
     """Unit slips and reversed signs."""
     for name in ("position", "setpoint_position"):
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
@@ -133,7 +133,7 @@ def check_units(axis: Axis) -> Iterator[Finding]:
         )
 
 
-def _ratios(axis: Axis) -> Iterator[Finding]:
+def _ratios(axis: Axis) -> Iterator[LogFinding]:
     """Signals that state the same in two sizes."""
     columns, smoother = axis.log.columns, axis.smoother
     setpoint = columns.get("setpoint_position")
@@ -165,7 +165,7 @@ def _ratios(axis: Axis) -> Iterator[Finding]:
 def _compare(
     axis: Axis, name: str, one: Array, other_name: str, other: Array,
     allowed: tuple[float, float], *, follows: bool = False, zero: bool = False,
-) -> Iterator[Finding]:  # fmt: skip
+) -> Iterator[LogFinding]:  # fmt: skip
     """Of a signal and the one that states the same, their ratio where it is not within ``allowed``.
 
     follows: whether the other is a setpoint. zero: whether 0 is the same on both sides.
@@ -192,7 +192,7 @@ def _compare(
     yield axis.error(fault, what, "correct unit, scale, sign or sample rate in the import map")
 
 
-def check_crossed(axes: Sequence[Axis]) -> Iterator[Finding]:
+def check_crossed(axes: Sequence[Axis]) -> Iterator[LogFinding]:
     """Swapped positions or forces, for each pair of axes that move.
 
     Of many axes only pairs are asked each of whose motions explains the other's force best.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from twin.checks.axis import READINGS, Axis, held_samples
 from twin.checks.breaks import and_more, held
-from twin.checks.report import WHOLE, Fault, Finding, Severity
+from twin.checks.report import WHOLE, Fault, LogFinding, Severity
 from twin.signals import Array, stretches
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
@@ -22,7 +22,7 @@ _ENTRY = re.compile(r"(\w+)\s*=\s*([^#]*)#(.*)")
 _UNIT = re.compile(r"unit\s*=\s*\"([^\"]*)\"(?:.*\bscale\s*=\s*([^\s,}]+))?")
 
 
-def check_content(axis: Axis) -> Iterator[Finding]:
+def check_content(axis: Axis) -> Iterator[LogFinding]:
     """Findings without which no other check makes sense."""
     yield from _missing(axis)
     for name, column in axis.log.columns.items():
@@ -52,7 +52,7 @@ def check_content(axis: Axis) -> Iterator[Finding]:
         yield axis.error(Fault.TOO_SHORT, what, "record longer")
 
 
-def _missing(axis: Axis) -> Iterator[Finding]:
+def _missing(axis: Axis) -> Iterator[LogFinding]:
     columns = axis.log.columns
     if "position" not in columns:
         yield axis.error(Fault.INCOMPLETE, "there is no position", "record the encoder")
@@ -83,10 +83,10 @@ def assumptions(map_text: str, axis: str) -> list[str]:
     return found
 
 
-def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[Finding]:
+def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding]:
     """A warning where the map that an axis was imported with assumes something."""
     if found := assumptions(metadata.get(MAP, ""), axis):
-        yield Finding(
+        yield LogFinding(
             Severity.WARNING, Fault.ASSUMED, axis,
             f"the import map assumes {', '.join(found)}", WHOLE,
             f"if that is right, take the word {ASSUMED} out of these lines of the map and import "
@@ -94,7 +94,7 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def check_excitation(axis: Axis) -> Iterator[Finding]:
+def check_excitation(axis: Axis) -> Iterator[LogFinding]:
     """Weak excitation and coarse position."""
     unit = axis.log.units["position"]
     often = float(np.quantile(np.abs(axis.velocity), 0.9)) > axis.still  # a tenth of the log
@@ -133,7 +133,7 @@ def check_excitation(axis: Axis) -> Iterator[Finding]:
         )
 
 
-def _directions(axis: Axis) -> Iterator[Finding]:
+def _directions(axis: Axis) -> Iterator[LogFinding]:
     fastest = float(np.quantile(np.abs(axis.velocity), 0.999))
     creep = 0.02  # of the highest speed; slower motion counts as standstill
     moving = axis.velocity[np.abs(axis.velocity) > creep * fastest]
@@ -160,7 +160,7 @@ def _directions(axis: Axis) -> Iterator[Finding]:
 # --- the command ----------------------------------------------------------------------------------
 
 
-def check_command(axis: Axis) -> Iterator[Finding]:
+def check_command(axis: Axis) -> Iterator[LogFinding]:
     """Held values, noise, and single samples."""
     if not axis.moves:
         return
@@ -216,7 +216,7 @@ def off_course(signal: Array) -> Array:
     return off
 
 
-def check_saturation(axis: Axis) -> Iterator[Finding]:
+def check_saturation(axis: Axis) -> Iterator[LogFinding]:
     """Saturation of the command."""
     force = axis.log.force
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.checks import check_log
-from twin.checks.report import WHOLE, CheckReport, Fault, Finding, Severity
+from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
 from twin.logs.decode import read_parts, require_intact, samples_by_axis
 from twin.logs.log import Log, in_multiples, joined, thinned
 
@@ -23,7 +23,7 @@ OWN = ("sample_rate_hz", "axes", "schema_version")  # metadata that are told as 
 
 
 @dataclass(frozen=True)
-class Part:
+class CheckedPart:
     """The report on the samples from ``start`` to ``stop``, s."""
 
     start: float
@@ -31,14 +31,14 @@ class Part:
     report: CheckReport
 
 
-def together(parts: Sequence[Part]) -> CheckReport:
+def together(parts: Sequence[CheckedPart]) -> CheckReport:
     """One report; a fault of an axis is said once, with the first place.
 
     That an axis stands still or moves one way in a part is none: it counts where all parts say so.
     """
     if len(parts) == 1:
         return parts[0].report
-    found: dict[tuple[str, Fault], dict[float, tuple[Part, Finding]]] = {}
+    found: dict[tuple[str, Fault], dict[float, tuple[CheckedPart, LogFinding]]] = {}
     for part in parts:
         for f in part.report.findings:
             found.setdefault((f.axis, f.fault), {}).setdefault(part.start, (part, f))
@@ -49,7 +49,7 @@ def together(parts: Sequence[Part]) -> CheckReport:
     return CheckReport(tuple(said))
 
 
-def _said(seen: Sequence[tuple[Part, Finding]], parts: int) -> Finding:
+def _said(seen: Sequence[tuple[CheckedPart, LogFinding]], parts: int) -> LogFinding:
     """A fault that was seen in some parts, of its worst severity."""
     part, first = next(((p, f) for p, f in seen if f.severity is Severity.ERROR), seen[0])
     if first.where == WHOLE and len(seen) == parts:
@@ -62,7 +62,7 @@ def _said(seen: Sequence[tuple[Part, Finding]], parts: int) -> Finding:
 
 def check_file(path: Path) -> CheckReport:
     """The findings on a whole log, which is read part by part and verified. Raises InputError."""
-    reports: list[Part] = []
+    reports: list[CheckedPart] = []
     for _ in _checked(_parts(path), reports):
         pass
     require_intact(path)
@@ -71,7 +71,7 @@ def check_file(path: Path) -> CheckReport:
 
 def read_checked(path: Path, fields: Sequence[str], every: int = 1) -> tuple[Log, CheckReport]:
     """``read_measured``, and the findings on the whole log. Raises InputError."""
-    reports: list[Part] = []
+    reports: list[CheckedPart] = []
     parts = (part.with_fields(fields) for part in _checked(_parts(path), reports))
     return joined(_thinned(parts, every)), together(reports)
 
@@ -100,12 +100,12 @@ def _parts(path: Path, fields: Sequence[str] | None = None) -> Iterator[Log]:
     return read_parts(path, -(-max(counts.values(), default=1) // parts), fields=fields)
 
 
-def _checked(parts: Iterable[Log], reports: list[Part]) -> Iterator[Log]:
+def _checked(parts: Iterable[Log], reports: list[CheckedPart]) -> Iterator[Log]:
     """The parts as they come, with the report on each put into ``reports``."""
     start = 0.0
     for part in parts:
         stop = start + len(part) * part.period
-        reports.append(Part(start, stop, check_log(part)))
+        reports.append(CheckedPart(start, stop, check_log(part)))
         yield part
         start = stop
 
@@ -157,7 +157,7 @@ class LogInfo:
 def log_info(path: str | Path) -> LogInfo:
     """What is in a log, which is read part by part. Raises InputError where it cannot be read."""
     samples = 0
-    reports: list[Part] = []
+    reports: list[CheckedPart] = []
     ranges: dict[tuple[str, str], tuple[float, float]] = {}
     for part in _checked(_parts(Path(path)), reports):
         samples += len(part)

@@ -43,7 +43,7 @@ class Fault(Enum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class LogFinding:
     """One fault of one axis: what and where with numbers and units, and the remedy."""
 
     severity: Severity
@@ -61,7 +61,7 @@ class Finding:
 class CheckReport:
     """All findings of a log, axis by axis."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
 
     @property
     def ok(self) -> bool:

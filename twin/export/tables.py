@@ -83,7 +83,7 @@ class AxisTables:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SetpointMotion:
     """A motion on which losses are told."""
 
     name: str
@@ -93,7 +93,7 @@ class Motion:
     """By axis (3, n): position m, velocity m/s, acceleration m/s^2."""
 
 
-def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
+def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[SetpointMotion]:
     """The setpoints of logs, or of moves over the travel where none is given."""
     if model.joints:
         raise InputError(f"{model.name}: its axes are joints; give a model of axes with a mass")
@@ -105,7 +105,9 @@ def motions(model: MachineModel, logs: Mapping[str, Log]) -> list[Motion]:
     found = []
     for name, s in given.items():
         by_axis = np.stack(s.part(0, len(s)).columns[:3]).transpose(2, 0, 1).copy()
-        found.append(Motion(name, 1.0 / s.sample_rate, dict(zip(model.axes, by_axis, strict=True))))
+        found.append(
+            SetpointMotion(name, 1.0 / s.sample_rate, dict(zip(model.axes, by_axis, strict=True)))
+        )
     return found
 
 
@@ -187,7 +189,7 @@ def fewest_points(speeds: Array, force: Array, count: int) -> tuple[Array, float
 
 
 @dataclass(frozen=True)
-class Judged(Held):
+class HeldAxis(Held):
     """The tables of one axis, and what becomes of its effects in them."""
 
     tables: AxisTables
@@ -197,7 +199,7 @@ Made = Callable[[AxisTables], AxisTables]
 """What a format makes of the tables of an axis."""
 
 
-def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dict[str, Judged]:
+def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dict[str, HeldAxis]:
     """The tables that a format makes of each axis, and by effect what they lose on the logs."""
     given = motions(model, logs)
     return {name: _judged(model, name, given, made) for name in model.axes}
@@ -205,8 +207,8 @@ def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dic
 
 def exported(
     model: MachineModel,
-    found: Mapping[str, Judged],
-    files_of: Callable[[str, AxisModel, Judged], Mapping[str, str]],
+    found: Mapping[str, HeldAxis],
+    files_of: Callable[[str, AxisModel, HeldAxis], Mapping[str, str]],
 ) -> Exported:
     """The files of each axis, made of its name as one of a program, itself and its tables."""
     names = axis_identifiers(model)
@@ -214,7 +216,7 @@ def exported(
     return Exported({file: text for files in made for file, text in files.items()}, found)
 
 
-def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> Judged:
+def _judged(model: MachineModel, name: str, given: list[SetpointMotion], made: Made) -> HeldAxis:
     axis, others = model.axes[name], [a for a in model.axes if a != name]
     ends = np.concatenate([m.setpoints[name][0] for m in given])
     reach = axis.hardware.travel or (float(ends.min()), float(ends.max()))
@@ -254,4 +256,4 @@ def _judged(model: MachineModel, name: str, given: list[Motion], made: Made) -> 
         else:
             text = (found.lost if lost else found.approximated)[effect]
         remarks[lost].append(Remark(name, effect, text))
-    return Judged(tuple(kept), tuple(remarks[False]), tuple(remarks[True]), whole)
+    return HeldAxis(tuple(kept), tuple(remarks[False]), tuple(remarks[True]), whole)

@@ -24,7 +24,7 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.importers.mapping import ImportMap, is_unit, raw_unit
-from twin.importers.table import Table, chosen, parsing
+from twin.importers.table import SignalTable, chosen, parsing
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 TIME = "time"
@@ -104,7 +104,7 @@ class _Layout:
         return self.style.is_number(cell) or self.style.is_stamp(cell)
 
 
-def read(path: Path, mapping: ImportMap) -> Table:
+def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a text table; raises InputError."""
     with parsing("a text table"):
         layout = _find_layout(path, mapping)
@@ -128,7 +128,7 @@ def read(path: Path, mapping: ImportMap) -> Table:
     for k in stamps:
         read[k] = read[k].astype(np.int64).astype("datetime64[us]")
     columns = {name: read[k] if name not in text else text[name] for name, k in places.items()}
-    return Table(columns, layout.sample_rate, layout.start_ns, layout.skip + 1)
+    return SignalTable(columns, layout.sample_rate, layout.start_ns, layout.skip + 1)
 
 
 def _microseconds(stamp: str) -> float:

@@ -34,7 +34,7 @@ from twin.errors import InputError
 from twin.importers.mapping import ImportMap
 from twin.importers.table import (
     SMALLEST_TABLE,
-    Table,
+    SignalTable,
     chosen,
     extra,
     parsing,
@@ -60,7 +60,7 @@ _PERIOD = "wf_increment"  # s a sample, of TDMS
 _FED, _PIECE = 1 << 16, 1 << 20  # bytes that are decompressed, and that come of them, at once
 
 
-def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
+def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
     """Columns of an HDF5 file, ``separator`` between the parts of a name; raises InputError."""
     h5py = extra("h5py")
     wanted = mapping.column_names()
@@ -85,15 +85,15 @@ def read_hdf5(path: Path, mapping: ImportMap, separator: str = "/") -> Table:
                     for key, column in (own or {name: values}).items():
                         columns |= split_columns(key, column)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
-        return Table({name: columns[name] for name in chosen(wanted, columns)})
+        return SignalTable({name: columns[name] for name in chosen(wanted, columns)})
 
 
-def read_json(path: Path, mapping: ImportMap) -> Table:
+def read_json(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a JSON file; raises InputError."""
     with parsing("JSON"):
         content = json.loads(path.read_text(encoding="utf-8-sig"))
         columns = _flat("", content if isinstance(content, dict) else {ROWS: content})
-    return Table({name: columns[name] for name in chosen(mapping.column_names(), columns)})
+    return SignalTable({name: columns[name] for name in chosen(mapping.column_names(), columns)})
 
 
 def _flat(prefix: str, content: Mapping[str, Any]) -> dict[str, NDArray]:
@@ -127,17 +127,17 @@ def _numeric(value: list[Any]) -> NDArray:
         return np.array([str(v) for v in value], dtype=object)
 
 
-def read_parquet(path: Path, mapping: ImportMap) -> Table:
+def read_parquet(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a Parquet file; raises InputError."""
     parquet = extra("pyarrow.parquet")
     with parsing("Parquet"), parquet.ParquetFile(path) as file:
         wanted = list(chosen(mapping.column_names(), file.schema_arrow.names))
         require_fits(8.0 * file.metadata.num_rows * len(wanted), path)
         table = file.read(columns=wanted)
-        return Table({name: table.column(name).to_numpy() for name in wanted})
+        return SignalTable({name: table.column(name).to_numpy() for name in wanted})
 
 
-def read_tdms(path: Path, mapping: ImportMap) -> Table:
+def read_tdms(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a TDMS file; raises InputError."""
     nptdms = extra("nptdms")
     with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
@@ -153,10 +153,10 @@ def read_tdms(path: Path, mapping: ImportMap) -> Table:
                     f"{period:.9g} s; export them at one rate"
                 )
         rate = 1.0 / next(iter(periods.values())) if periods else None
-        return Table({name: c[:] for name, c in read.items()}, rate)
+        return SignalTable({name: c[:] for name, c in read.items()}, rate)
 
 
-def read_mat(path: Path, mapping: ImportMap) -> Table:
+def read_mat(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a MAT file; raises InputError."""
     matlab_header = 512  # bytes before the signature in a MAT file of version 7.3
     with open(path, "rb") as stream:
@@ -170,7 +170,9 @@ def read_mat(path: Path, mapping: ImportMap) -> Table:
     copies = 4  # of its content, that SciPy and the way back to this process take
     # In a process of its own: SciPy's reader of damaged files may crash, hang or fill the memory.
     seconds, memory = shortest + content / slowest, SMALLEST_TABLE + copies * content
-    return Table(isolated(_load, path, mapping.column_names(), seconds=seconds, memory=memory))
+    return SignalTable(
+        isolated(_load, path, mapping.column_names(), seconds=seconds, memory=memory)
+    )
 
 
 def content_bytes(path: Path) -> int:
@@ -225,7 +227,7 @@ _MODULES = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-def read_mcap(path: Path, mapping: ImportMap) -> Table:
+def read_mcap(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of an MCAP file; raises InputError."""
     wanted = mapping.column_names()
     held: dict[str, array] = {}
@@ -247,7 +249,7 @@ def read_mcap(path: Path, mapping: ImportMap) -> Table:
                     raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
     require_columns(wanted, seen)
     kinds = {name: "datetime64[ns]" if name in stamps else None for name in wanted or held}
-    return Table({name: np.array(held[name], kind) for name, kind in kinds.items()})
+    return SignalTable({name: np.array(held[name], kind) for name, kind in kinds.items()})
 
 
 def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:

@@ -28,7 +28,7 @@ from twin.importers.course import (
 )
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap, find_unit, is_unit, raw_unit
-from twin.importers.table import Table, numbers
+from twin.importers.table import SignalTable, numbers
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
@@ -321,7 +321,7 @@ def _why_not(name: str, found: Mapping[str, Signal], columns: Columns, step: flo
     return "neither name nor course tells a signal"
 
 
-def _distinct(table: Table) -> tuple[dict[str, Array], dict[str, str]]:
+def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
     """The columns of numbers, each once, and where a straight line is across a hole in one.
 
     An entry of an array that has a name goes by that.

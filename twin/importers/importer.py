@@ -27,7 +27,7 @@ from twin.importers.formats import (
     read_tdms,
 )
 from twin.importers.mapping import ImportMap
-from twin.importers.table import Table, numbers
+from twin.importers.table import SignalTable, numbers
 from twin.importers.time_base import TimeBase, even_times, rate_of, time_base_of
 from twin.logs.container import reading
 from twin.logs.log import HELD, Array, AxisLog, Log
@@ -36,7 +36,7 @@ from twin.numbers import independent
 
 Columns = Mapping[str, Array]
 Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint -> ratio
-FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], Table]]] = {
+FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], SignalTable]]] = {
     "csv": ((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
     "mat": ((".mat",), read_mat),
     "hdf5": ((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
@@ -114,7 +114,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     return _log(mapping, even, rate, facts)
 
 
-def _times(table: Table, mapping: ImportMap, columns: Columns) -> Array:
+def _times(table: SignalTable, mapping: ImportMap, columns: Columns) -> Array:
     """The times (n,) of the rows of one of several files, s."""
     if mapping.time is None:
         rate = _sample_rate(table, mapping, columns)
@@ -126,14 +126,14 @@ def _times(table: Table, mapping: ImportMap, columns: Columns) -> Array:
     return times
 
 
-def table_of(path: Path, mapping: ImportMap) -> Table:
+def table_of(path: Path, mapping: ImportMap) -> SignalTable:
     """The columns that a map names, all where it has no axes; raises InputError."""
     return FORMATS[_format_name(path, mapping)][1](path, mapping)
 
 
 def _read(
     path: Path, mapping: ImportMap
-) -> tuple[Table, Columns, dict[str, str], dict[str, float]]:
+) -> tuple[SignalTable, Columns, dict[str, str], dict[str, float]]:
     """The table, its columns as numbers, format and sha256 of the file, and scalars by name."""
     name = _format_name(path, mapping)
     with open(path, "rb") as stream:
@@ -189,7 +189,7 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
     return Log(rate, at_joints(axes, gears), metadata)
 
 
-def _start(table: Table, mapping: ImportMap, columns: Columns) -> dict[str, str]:
+def _start(table: SignalTable, mapping: ImportMap, columns: Columns) -> dict[str, str]:
     """When the recording began by the wall clock, where the format or its times say so."""
     start = table.start_ns
     if start is None and mapping.time is not None:
@@ -228,7 +228,7 @@ def _common_length(columns: Columns) -> int:
     return len(values)
 
 
-def _sample_rate(table: Table, mapping: ImportMap, columns: Columns) -> float:
+def _sample_rate(table: SignalTable, mapping: ImportMap, columns: Columns) -> float:
     if mapping.time is not None:
         dated = table.columns[mapping.time.name].dtype.kind == "M"
         if dated and mapping.time.seconds != 1.0:

@@ -29,7 +29,7 @@ SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 
 @dataclass(frozen=True)
-class Table:
+class SignalTable:
     """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them.
 
     first_line: that of the first row, in a file of text.

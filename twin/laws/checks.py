@@ -17,8 +17,8 @@ from twin.core.user_effect import RESULT, Guarded, Outside, outside_words
 from twin.effect import DRY, OUT, READING, STATIC, VISCOUS, Effect, Kind, U
 from twin.laws.trials import (
     Array,
-    Motion,
     Trace,
+    TrialMotion,
     Values,
     absent,
     action,
@@ -67,7 +67,7 @@ def check_declared(effect: Effect) -> None:
     """
     rng = np.random.default_rng(10)
     guarded_samples = 40  # plain Python is slow, and each value is one more run
-    samples = sampled(Motion.random(rng, guarded_samples)).tolist()
+    samples = sampled(TrialMotion.random(rng, guarded_samples)).tolist()
     present = {p.name: p.start or 0.1 if p.strength else p.start for p in effect.parameters}
     for values in (legal(effect, present), *extremes(effect, rng)):
         p = Guarded("p", [values[q.name] for q in effect.parameters])
@@ -87,7 +87,7 @@ def check_declared(effect: Effect) -> None:
 def check_writes_only_its_result(effect: Effect) -> None:
     """A law writes its kind's results and its own states, nothing else."""
     rng = np.random.default_rng(14)
-    found = trace(effect, moderate(effect, rng), Motion.random(rng))
+    found = trace(effect, moderate(effect, rng), TrialMotion.random(rng))
     changed = set(np.flatnonzero(np.any(found.after != found.before, axis=0)).tolist())
     if others := sorted(changed - RESULTS[effect.kind]):
         raise LawBroken(
@@ -102,7 +102,7 @@ def check_writes_only_its_result(effect: Effect) -> None:
 
 def check_zero_is_absent(effect: Effect) -> None:
     """With every strength zero the effect changes no force and no reading, to the bit."""
-    cycles = Motion.cycles()
+    cycles = TrialMotion.cycles()
     motion, nothing = replace(cycles, u=cycles.u + 0.3), absent(effect)
     beside = of_kind(Kind.FRICTION) if effect.kind is not Kind.FRICTION else (None,)
     for friction in beside:
@@ -130,7 +130,7 @@ def check_acts(effect: Effect) -> None:
     if not most > 0.02:  # N rms, or um of a reading
         sensing = effect.kind is Kind.SENSING
         unit = f"u{LINEAR.position}" if sensing else LINEAR.force
-        reach = np.abs(Motion.cycles().x).max()
+        reach = np.abs(TrialMotion.cycles().x).max()
         raise LawBroken(
             f"it does nothing: its action is {most:.2g} {unit} rms over +-{reach:g} "
             f"{LINEAR.position}, whatever its strengths; give starts and bounds that let it act"
@@ -143,7 +143,7 @@ def check_finite(effect: Effect) -> None:
     v = np.array([0.0, 0.0, 1e-300, -1e-300, 1e-9, -1e-9, 0.0, 0.1, 0.1, -0.1, 0.0, 5.0, -5.0, 0.0])
     x = np.array([0.0, 0.0, 0.0, 0.0, 1e-9, 0.0, 0.0, 0.1, 0.2, -0.1, -0.2, 1.0, -1.0, 0.0])
     for dt in (1e-5, 1e-4, 1e-3):  # s
-        motion = Motion(dt, x, v, 10.0 * v)
+        motion = TrialMotion(dt, x, v, 10.0 * v)
         for values in extremes(effect, rng):
             found = trace(effect, values, motion)
             for what, rows in (("result", found.after), ("state", found.states)):
@@ -160,7 +160,7 @@ def check_compiled_equals_python(effect: Effect) -> None:
     """The native law is the plain Python law, to rounding, on lists as on arrays."""
     rng = np.random.default_rng(13)
     for _ in range(2):
-        values, motion = moderate(effect, rng), Motion.random(rng, samples=200)
+        values, motion = moderate(effect, rng), TrialMotion.random(rng, samples=200)
         native = trace(effect, values, motion)
         plain = trace(effect, values, motion, law=effect.law)
         rounding = 1e-11  # between the compiled and the plain law, of the largest value

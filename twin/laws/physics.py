@@ -13,7 +13,7 @@ import numpy as np
 from twin.effect import DRY, OUT, READING, STATIC, TIME, VISCOUS, Effect, Kind, U, V, X
 from twin.laws.checks import RESULTS, LawBroken, with_values
 from twin.laws.formula import NoFormula, formula
-from twin.laws.trials import Motion, Values, acted, forces, moderate, of_kind, trace
+from twin.laws.trials import TrialMotion, Values, acted, forces, moderate, of_kind, trace
 from twin.model.machine import Fitted
 from twin.model.units import LINEAR, dimension
 
@@ -25,7 +25,7 @@ def check_sample_rate(effect: Effect) -> None:
     """The same motion sampled four times as often leaves about the same force, or reading."""
     rates = (2500.0, 10_000.0)  # Hz, the second a multiple of the first
     values = moderate(effect, np.random.default_rng(17))
-    slow, fast = (acted(effect, values, Motion.cycles(samples=round(rate))) for rate in rates)
+    slow, fast = (acted(effect, values, TrialMotion.cycles(samples=round(rate))) for rate in rates)
     every = round(rates[1] / rates[0])
     for one, all_of_other in zip(slow, fast, strict=True):
         other = all_of_other[::every]
@@ -42,7 +42,9 @@ def check_sample_rate(effect: Effect) -> None:
             )
 
 
-def _work(effect: Effect, values: Values, motion: Motion, *around: Fitted) -> tuple[float, float]:
+def _work(
+    effect: Effect, values: Values, motion: TrialMotion, *around: Fitted
+) -> tuple[float, float]:
     """What an effect gives along a motion beside others, N m, and what goes to and fro."""
     force = forces([Fitted.at_start(effect, values), *around], motion)[effect.name]
     power = force * motion.v
@@ -67,7 +69,7 @@ def check_dissipative(friction: Effect, modifier: Effect | None = None) -> None:
         around = [[Fitted.at_start(modifier, moderate(modifier, rng, w))] for w in (0.3, 1e9)]
     for values in (friction.starts(), moderate(friction, rng)):
         for amplitude, changed in product((1e-6, 1e-4, 1e-2, 0.15), around):  # m
-            given, size = _work(friction, values, Motion.cycles(amplitude), *changed)
+            given, size = _work(friction, values, TrialMotion.cycles(amplitude), *changed)
             if not given <= ROUNDING * size:
                 beside = f" under {modifier.name}" if modifier else ""
                 raise LawBroken(
@@ -81,8 +83,8 @@ def depends_on_position_alone(effect: Effect, values: Values) -> bool:
     """Whether a force effect has no state and the same force at any speed, time and command."""
     if effect.kind is not Kind.FORCE or effect.states:
         return False
-    motion = Motion.random(np.random.default_rng(16))
-    other = Motion(2.0 * motion.dt, motion.x, motion.v[::-1], motion.u[::-1])
+    motion = TrialMotion.random(np.random.default_rng(16))
+    other = TrialMotion(2.0 * motion.dt, motion.x, motion.v[::-1], motion.u[::-1])
     return np.array_equal(
         trace(effect, values, motion).after[:, OUT], trace(effect, values, other).after[:, OUT]
     )
@@ -90,7 +92,7 @@ def depends_on_position_alone(effect: Effect, values: Values) -> bool:
 
 def check_conservative(effect: Effect, values: Values) -> None:
     """No net work around a loop in position, whatever the speeds out and back."""
-    left, size = _work(effect, values, Motion.cycles(0.15, cycles=1, samples=20_000))
+    left, size = _work(effect, values, TrialMotion.cycles(0.15, cycles=1, samples=20_000))
     if not np.abs(left) <= ROUNDING * size:
         raise LawBroken(f"work of {left:.3g} {WORK} is left around a loop in position")
 
@@ -116,7 +118,7 @@ def check_units(effect: Effect) -> None:
     a unit of its own.
     """
     values = moderate(effect, np.random.default_rng(23))
-    motion = Motion.random(np.random.default_rng(24))
+    motion = TrialMotion.random(np.random.default_rng(24))
     # Without the tiniest speeds, at which a guard against zero may act.
     motion = replace(motion, v=np.where(np.abs(motion.v) < 1e-5, 0.0, motion.v))
     found = trace(effect, values, motion).after
@@ -124,7 +126,7 @@ def check_units(effect: Effect) -> None:
     for units in OTHER_UNITS[turning:]:  # on a rotary axis alone x is an angle, without a unit
         converted = {p.name: values[p.name] * _factor(p.unit, units) for p in effect.parameters}
         force, length, time = units
-        scaled = Motion(
+        scaled = TrialMotion(
             motion.dt * time, motion.x * length, motion.v * length / time, motion.u * force
         )
         other = trace(effect, converted, scaled).after
@@ -151,7 +153,7 @@ def check_equation(effect: Effect) -> None:
     try:
         computed = formula(effect.equation, [p.name for p in effect.parameters])
         values = moderate(effect, np.random.default_rng(25))
-        found = trace(effect, values, Motion.random(np.random.default_rng(26)))
+        found = trace(effect, values, TrialMotion.random(np.random.default_rng(26)))
         x, v, t = (found.before[:, slot] for slot in (X, V, TIME))
         wanted = computed({"x": x, "v": v, "t": t, **{n: np.array(o) for n, o in values.items()}})
     except NoFormula:
@@ -181,7 +183,7 @@ def check_takes_speed(effect: Effect) -> None:
     if driven or not strengths or any(p.lower < 0.0 for p in strengths):
         return
     values = moderate(effect, np.random.default_rng(27))
-    given, size = _work(effect, values, Motion.cycles(0.15))
+    given, size = _work(effect, values, TrialMotion.cycles(0.15))
     if not given <= 1e-3 * size:
         raise LawBroken(
             f"it gives {given:.3g} {WORK} in closed cycles of +-0.15 {LINEAR.position}, "

@@ -41,7 +41,7 @@ from twin.signals import Array, rate
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TrialMotion:
     """A motion of one axis: x m, v m/s, u N (n,) every ``dt`` s."""
 
     dt: float
@@ -53,7 +53,7 @@ class Motion:
         return len(self.x)
 
     @classmethod
-    def cycles(cls, amplitude: float = 0.1, cycles: int = 2, samples: int = 4000) -> Motion:
+    def cycles(cls, amplitude: float = 0.1, cycles: int = 2, samples: int = 4000) -> TrialMotion:
         """Closed cycles of 1 s over +-amplitude (m), faster and slower, other speeds out than back.
 
         samples: in a cycle.
@@ -65,7 +65,7 @@ class Motion:
         return cls(dt, amplitude * np.sin(bent), v, rate(v, dt))
 
     @classmethod
-    def random(cls, rng: np.random.Generator, samples: int = 400, dt: float = 1e-4) -> Motion:
+    def random(cls, rng: np.random.Generator, samples: int = 400, dt: float = 1e-4) -> TrialMotion:
         """Unrelated random numbers, with some samples at rest and many changes of direction."""
         v = rng.normal(0.0, 0.1, samples) * 10.0 ** rng.uniform(-6.0, 0.0, samples)
         v[rng.random(samples) < 0.1] = 0.0
@@ -75,7 +75,7 @@ class Motion:
 Values = Mapping[str, float]
 
 
-def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
+def forces(effects: Sequence[Fitted], motion: TrialMotion) -> dict[str, Array]:
     """Force of each effect along a measured motion, (n,) N; of an actuation what it changed."""
     table = axis_table({"x": AxisModel(1.0, effects=tuple(effects))})
     rows = np.zeros((len(table.entries), len(motion)))
@@ -89,7 +89,7 @@ def forces(effects: Sequence[Fitted], motion: Motion) -> dict[str, Array]:
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
 
-def sampled(motion: Motion) -> Array:
+def sampled(motion: TrialMotion) -> Array:
     """What a simulation fills io with before a law, (n, IO_SIZE)."""
     io = np.zeros((len(motion), IO_SIZE))
     index = np.arange(len(motion))
@@ -126,7 +126,9 @@ def compiled(effect: Effect, *arrays: Array) -> Callable[[], object]:
     return partial(native, *(a.ctypes.data_as(pointer) for a in arrays))
 
 
-def trace(effect: Effect, values: Values, motion: Motion, law: Callable | None = None) -> Trace:
+def trace(
+    effect: Effect, values: Values, motion: TrialMotion, law: Callable | None = None
+) -> Trace:
     """Step the compiled law, or the one given, over a motion."""
     mark = 0.123456789  # in the memory behind a law's own parameters and states
     given = np.array([*(values[p.name] for p in effect.parameters), mark])
@@ -231,7 +233,7 @@ def action(effect: Effect, values: Values) -> float:
     return float((1e6 if effect.kind is Kind.SENSING else 1.0) * np.sqrt(most))
 
 
-def acted(effect: Effect, values: Values, motion: Motion) -> list[Array]:
+def acted(effect: Effect, values: Values, motion: TrialMotion) -> list[Array]:
     """What the effect does along a motion, (n,) each: for a modifier, to each friction."""
     own = Fitted.at_start(effect, values)
     if effect.kind is Kind.SENSING:
@@ -246,12 +248,12 @@ def acted(effect: Effect, values: Values, motion: Motion) -> list[Array]:
 
 
 @cache
-def _cycles() -> Motion:
+def _cycles() -> TrialMotion:
     """The motion of ``action``."""
-    return Motion.cycles(samples=1000)
+    return TrialMotion.cycles(samples=1000)
 
 
 @lru_cache(maxsize=32)  # along the motion of ``action`` it is asked for again and again
-def _unmodified(friction: Effect, motion: Motion) -> Array:
+def _unmodified(friction: Effect, motion: TrialMotion) -> Array:
     """The force of a friction by itself, (n,) N."""
     return forces([companion(friction)], motion)[friction.name]

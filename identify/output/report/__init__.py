@@ -13,12 +13,12 @@ from identify.output.numbers import capitalised, quantity
 from identify.output.report import answer, effects, machine, residual
 from identify.output.report.explorer import explored
 from identify.output.report.page import (
-    Answer,
+    AnswerBlock,
     Block,
     Chart,
     Heading,
     Listing,
-    Part,
+    PagePart,
     Section,
     fragment,
 )
@@ -30,19 +30,19 @@ from twin.files import require_writable, write_atomically
 from twin.model.file import format_model
 
 SECTIONS = (
-    Part("answer", "Answer", answer.cards),
-    Part("found", "What each effect explains", effects.found),
-    Part("law-shape", "The shape of a law", effects.law_shapes),
-    Part("regions", "Where the error is", residual.regions),
-    Part("ranking", "Candidates, ranked", effects.ranking),
-    Part("growth", "The error, effect by effect", of_all=effects.growth),
-    Part("equations", "The laws of the named effects", effects.equations),
-    Part("parameters", "Parameters", effects.parameters),
-    Part("logs", "Errors log by log", residual.logs),
-    Part("worth", "What it gains as feedforward", machine.worth),
-    Part("frequency", "The frequency response", machine.responses),
-    Part("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
-    Part("notes", "Notes", of_all=answer.notes),
+    PagePart("answer", "Answer", answer.cards),
+    PagePart("found", "What each effect explains", effects.found),
+    PagePart("law-shape", "The shape of a law", effects.law_shapes),
+    PagePart("regions", "Where the error is", residual.regions),
+    PagePart("ranking", "Candidates, ranked", effects.ranking),
+    PagePart("growth", "The error, effect by effect", of_all=effects.growth),
+    PagePart("equations", "The laws of the named effects", effects.equations),
+    PagePart("parameters", "Parameters", effects.parameters),
+    PagePart("logs", "Errors log by log", residual.logs),
+    PagePart("worth", "What it gains as feedforward", machine.worth),
+    PagePart("frequency", "The frequency response", machine.responses),
+    PagePart("tests", "Is the residual noise?", residual.whiteness, residual.reasons),
+    PagePart("notes", "Notes", of_all=answer.notes),
 )
 
 
@@ -60,14 +60,14 @@ def write_report(path: Path, subject: Subject) -> None:
     write_atomically(path, text.encode("utf-8"))
 
 
-def sections(subject: Subject, parts: Sequence[Part] = SECTIONS) -> list[Section]:
+def sections(subject: Subject, parts: Sequence[PagePart] = SECTIONS) -> list[Section]:
     """The sections that have something to show: of each axis, then of all."""
     made = []
     for part in parts:
         blocks: list[Block] = []
         for view in subject.views:
             own = part.of_axis(view) if part.of_axis else []
-            if own and len(subject.views) > 1 and not isinstance(own[0], Answer | Heading):
+            if own and len(subject.views) > 1 and not isinstance(own[0], AnswerBlock | Heading):
                 blocks.append(Heading(f"Axis {view.name}"))
             blocks += own
         if part.of_all:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from identify.dataset.dataset import Role
 from identify.links import WrongBody
 from identify.output.machine import minor
-from identify.output.numbers import Scale, arrow, capitalised, number, quantity, spaced
-from identify.output.report.page import Answer, Block, Listing, Tile, Tone
+from identify.output.numbers import DisplayUnit, arrow, capitalised, number, quantity, spaced
+from identify.output.report.page import AnswerBlock, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
@@ -27,7 +27,7 @@ def cards(view: AxisView) -> list[Block]:
     return [_body(diagnosis, diagnosis.body, view.subject.source), own]
 
 
-def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> Answer:
+def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> AnswerBlock:
     """The card of a body whose inertia is not that of its file."""
     sentence, *others = body_in_words(diagnosis, source)
     axes = diagnosis.model.axes
@@ -41,12 +41,12 @@ def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> Answer:
         if a in body.axes
     ]
     headline = f"Body {' or '.join((body.body, *body.level))}: another inertia"
-    return Answer(headline, sentence, tiles, others, Tone.STRONG)
+    return AnswerBlock(headline, sentence, tiles, others, Tone.STRONG)
 
 
 def _diagnosed(
     view: AxisView, diagnosis: Diagnosis, found: AxisDiagnosis, summary: AxisSummary, said: Said
-) -> Answer:
+) -> AnswerBlock:
     quiet = found.verdict is Verdict.NOTHING_MISSING
     plan, refit = diagnosis.next_experiments.get(view.name), diagnosis.refits.get(view.name)
     remarks = (
@@ -56,7 +56,7 @@ def _diagnosed(
         refit_in_words(refit) if quiet and refit else None,
         *said.advice,
     )
-    return Answer(
+    return AnswerBlock(
         headline=f"Axis {view.name}: {said.headline}",
         sentence=" ".join((said.verdict, *said.left)),
         tiles=_tiles(view, found, summary),
@@ -81,7 +81,10 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
         Tile(view.words(f"Force error, {on}"), _fall(*pair, unit), remark)
         for on, pair in errors.items()
     ]
-    ratio, noise = _fall(base.error / floor, final.error / floor, "1"), Scale.of(unit, base.error)
+    ratio, noise = (
+        _fall(base.error / floor, final.error / floor, "1"),
+        DisplayUnit.of(unit, base.error),
+    )
     of = f"training logs; floor {noise.text(floor)} RMS"
     tiles.append(Tile("Error over noise floor", ratio, of))
     return [*tiles, *_position_tile(view, f", without {view.label}" if view.label else "")]
@@ -98,7 +101,7 @@ def _position_tile(view: AxisView, model: str) -> list[Tile]:
     return [Tile(view.words("Position, free run"), worst, f"RMS of the worst log{model}")]
 
 
-def _compared(view: AxisView) -> Answer:
+def _compared(view: AxisView) -> AnswerBlock:
     axis, unit = view.axis, view.units.force
     ratio, tone = number(axis.ratio), Tone.STRONG
     headline = view.words(f"force error {ratio} times the noise floor")
@@ -108,7 +111,7 @@ def _compared(view: AxisView) -> Answer:
         headline, sentence = "the model explains the measurement", "is at its noise floor."
         commands, tone = [], Tone.PLAIN
     error, floor = quantity(axis.total_error, unit), quantity(axis.floor, unit)
-    return Answer(
+    return AnswerBlock(
         headline=f"Axis {view.name}: {headline}",
         sentence=view.words(f"The force error {sentence}"),
         tiles=[

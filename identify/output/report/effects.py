@@ -10,7 +10,7 @@ from identify.estimation.found_shape import FoundShape
 from identify.estimation.intervals import Estimate, ModelWrong
 from identify.output.numbers import (
     NOTHING,
-    Scale,
+    DisplayUnit,
     capitalised,
     number,
     percent,
@@ -28,7 +28,7 @@ from identify.output.report.page import (
     Line,
     Listing,
     Row,
-    Table,
+    TableBlock,
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
@@ -60,7 +60,7 @@ def found(view: AxisView) -> list[Block]:
     if view.found is None or not view.found.findings:
         return []
     findings, tested, unit = view.found.findings, view.found.tested, view.units.force
-    scale = Scale.of(unit, [tested.before, *(f.tested.before for f in findings)])
+    scale = DisplayUnit.of(unit, [tested.before, *(f.tested.before for f in findings)])
     columns: dict[str, Callable[[Finding], str]] = {
         "Effect": lambda f: title_case(f.effect),
         "Error without it": lambda f: scale.text(f.tested.before),
@@ -77,7 +77,7 @@ def found(view: AxisView) -> list[Block]:
         "same force shifted in time, which cannot be real, at most the next. Right: of answers as "
         "well supported, on machines whose missing effect is known."
     )
-    table = Table.of(
+    table = TableBlock.of(
         findings, columns, view.words(caption), bar=lambda f: min(max(f.explains, 0.0), 1.0)
     )
     if len(findings) == 1:
@@ -107,8 +107,8 @@ def law_shapes(view: AxisView) -> list[Block]:
 def shape_charts(shape: FoundShape) -> list[Chart]:
     """The curve assumed beside the curve found, a chart for each direction."""
     curves = shape.curves.values()
-    scale = Scale.of(shape.force_unit, [(c.found, c.assumed) for c in curves])
-    along, words = Scale.of(shape.unit, shape.coordinate), units_of(shape.force_unit).words
+    scale = DisplayUnit.of(shape.force_unit, [(c.found, c.assumed) for c in curves])
+    along, words = DisplayUnit.of(shape.unit, shape.coordinate), units_of(shape.force_unit).words
     within = " within one period" if shape.period is not None else ""
     label = along.label(words(f"{shape.over.value}{within}").capitalize())
     return [
@@ -141,10 +141,10 @@ def ranking(view: AxisView) -> list[Block]:
     return blocks
 
 
-def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
+def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> TableBlock:
     """Evidence, errors, and why a candidate is not proved."""
     units = found.dataset.units
-    scale = Scale.of(units.force, [c.gain.before for c in refitted])
+    scale = DisplayUnit.of(units.force, [c.gain.before for c in refitted])
     told = [c.effect.name for c in refitted[:3]]  # with their values
     columns: dict[str, Callable[[Candidate], str]] = {
         "Effect": lambda c: title_case(c.effect.name),
@@ -164,7 +164,7 @@ def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> Table:
     def tone(c: Candidate) -> Tone:
         return Tone.STRONG if c is found.best else Tone.PLAIN if c.supported else Tone.MUTED
 
-    return Table.of(
+    return TableBlock.of(
         refitted, columns, units.words(caption), tone, lambda c: min(max(c.part, 0.0), 1.0)
     )
 
@@ -192,12 +192,12 @@ def growth(subject: Subject) -> list[Block]:
     return [*blocks, _positions(subject.additions)] if subject.additions else blocks
 
 
-def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> Table:
+def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> TableBlock:
     """The errors before and after each step, and the noise floors of the logs of this page."""
     errors = [errors_of_step(step) for step in steps]
     tested = [Role.TEST] if any(Role.TEST in own for own in errors) else []
     shown = [Role.TRAINING, Role.SELECTION, *tested]
-    scale = Scale.of(steps[0].unit, [own[Role.TRAINING] for own in errors])
+    scale = DisplayUnit.of(steps[0].unit, [own[Role.TRAINING] for own in errors])
     rows = []
     for s, own in zip(steps, errors, strict=True):
         cells = (scale.text(error) for role in shown for error in own.get(role, (None, None)))
@@ -212,14 +212,14 @@ def growth_table(steps: Sequence[HistoryStep], floors: Mapping[Role, float]) -> 
         "refitted. A real effect lowers the error on the selection logs as much as that on the "
         "training logs."
     )
-    return Table(["Effect added", *when], rows, units_of(steps[0].unit).words(caption))
+    return TableBlock(["Effect added", *when], rows, units_of(steps[0].unit).words(caption))
 
 
-def _positions(additions: Sequence[Addition]) -> Table:
+def _positions(additions: Sequence[Addition]) -> TableBlock:
     rows = []
     for a in additions:
         alike = (b for b in additions if b.units.position == a.units.position)
-        scale = Scale.of(a.units.position, [e for b in alike for e in b.position_error or ()])
+        scale = DisplayUnit.of(a.units.position, [e for b in alike for e in b.position_error or ()])
         errors = (*(a.position_error or (None, None)), a.replayed)
         name = f"{title_case(a.step.effect)} on {a.step.axis}"
         rows.append(Row((name, *map(scale.text, errors), "kept" if a.kept else "not supported")))
@@ -227,7 +227,7 @@ def _positions(additions: Sequence[Addition]) -> Table:
         "Effect added", "Free run, before", "Free run, after", "Replayed by MuJoCo", "Outcome",
     )  # fmt: skip
     what = " and ".join(dict.fromkeys(a.units.words("position") for a in additions))
-    return Table(titles, rows, f"RMS {what} error of the model driven by the logged command.")
+    return TableBlock(titles, rows, f"RMS {what} error of the model driven by the logged command.")
 
 
 # --- the laws that are named -----------------------------------------------------------------
@@ -284,7 +284,7 @@ def given_table(axis: AxisModel) -> list[Block]:
         if c.label not in hidden
     ]
     caption = "Values of the given model; twin fit adds intervals."
-    return [Table(("Parameter", "Value", "Meaning"), rows, caption)]
+    return [TableBlock(("Parameter", "Value", "Meaning"), rows, caption)]
 
 
 def fit_table(
@@ -316,4 +316,4 @@ def fit_table(
         Row((*row, meanings.get(name, "")), Tone.STRONG if name in new else Tone.PLAIN)
         for name, row in cells.items()
     ]
-    return [Table([*titles, "Meaning"], rows, " ".join(remarks))] if rows else []
+    return [TableBlock([*titles, "Meaning"], rows, " ".join(remarks))] if rows else []

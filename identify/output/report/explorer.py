@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Role
 from identify.output import INKS
-from identify.output.numbers import Scale, packed, quantity, spaced, title_case, typeset
+from identify.output.numbers import DisplayUnit, packed, quantity, spaced, title_case, typeset
 from identify.output.report.subject import AxisView, Subject
 from identify.results.results import Comparison, Diagnosis
 from identify.results.signals import Signals, means
@@ -23,7 +23,7 @@ from twin.signals import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Named = dict[str, tuple[str, Array, Scale]]
+Named = dict[str, tuple[str, Array, DisplayUnit]]
 
 TO_EXPLAIN = "measured force minus mass × acceleration"
 OTHER = "other_axis_"
@@ -95,8 +95,8 @@ def _logs(signals: Signals, index: NDArray[np.int64]) -> list[dict[str, Any]]:
 def named_signals(view: AxisView) -> Named:
     """Every signal of a page by its name there: what it is called, its values, and the unit."""
     signals, units, words = view.signals, view.units, view.words
-    left = Scale.of(units.force, [3.0 * signals.size])
-    force = Scale.of(units.force, signals.to_explain)
+    left = DisplayUnit.of(units.force, [3.0 * signals.size])
+    force = DisplayUnit.of(units.force, signals.to_explain)
     without = f"error without {view.label}" if view.label else words("unexplained force")
     to_explain = words(TO_EXPLAIN.replace("mass", units.mass_name))
     named = {
@@ -110,7 +110,7 @@ def named_signals(view: AxisView) -> Named:
     for name, values in signals.coordinates.items():
         unit = signals.units[name]
         text = units_of(unit).words(NAMES.get(name, title_case(name)))
-        named[name] = (text, values, Scale.of(unit, values))
+        named[name] = (text, values, DisplayUnit.of(unit, values))
     return named
 
 
@@ -195,7 +195,7 @@ def residual(result: Diagnosis | Comparison, coordinate: str | None, axis: str |
     values = signals.over(name)
     shown = named_signals(view)
     _, _, left = shown["before"]
-    label, _, along = shown.get(name, ("Time", values, Scale.of("s", values)))
+    label, _, along = shown.get(name, ("Time", values, DisplayUnit.of("s", values)))
     figure, place = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
     plt.close(figure)  # a notebook shows what is returned, once
     floor = float(left(view.axis.floor))

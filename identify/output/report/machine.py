@@ -7,7 +7,7 @@ import numpy as np
 from identify.frequency.of_logs import AxisFrequency
 from identify.output.frequency import read_off
 from identify.output.numbers import NOTHING, pretty, quantity
-from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
+from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
 from identify.output.report.subject import AxisView
 from identify.results.frequency import by_source
 
@@ -49,13 +49,13 @@ def _bode(found: AxisFrequency) -> list[Chart]:
     ]
 
 
-def _table(found: AxisFrequency) -> Table:
+def _table(found: AxisFrequency) -> TableBlock:
     """What is read off each, side by side."""
     told = {name: dict(read_off(shown, found)) for name, shown in by_source(found).items()}
     rows = dict.fromkeys(name for facts in told.values() for name in facts)
     titles = ("Read off, with 90 % band", *(name.capitalize() for name in told))
     cells = [(row, *(facts.get(row, NOTHING) for facts in told.values())) for row in rows]
-    return Table(titles, [Row(one) for one in cells])
+    return TableBlock(titles, [Row(one) for one in cells])
 
 
 def worth(view: AxisView) -> list[Block]:
@@ -81,4 +81,4 @@ def worth(view: AxisView) -> list[Block]:
         for effect, gain in found.gains.items()
     ]
     told += [f"Not in it: {effect}, {why}." for effect, why in result.lost[view.name].items()]
-    return [Table(("Tracking error", "RMS", "Largest"), rows, caption), Listing(told)]
+    return [TableBlock(("Tracking error", "RMS", "Largest"), rows, caption), Listing(told)]

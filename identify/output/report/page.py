@@ -41,7 +41,7 @@ class Block:
 
     @property
     def macro(self) -> str:
-        return type(self).__name__.lower()
+        return type(self).__name__.removesuffix("Block").lower()
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table(Block):
+class TableBlock(Block):
     """A table, with a sentence below it (may be empty); titles: of the columns."""
 
     titles: Sequence[str]
@@ -134,7 +134,7 @@ class Table(Block):
     def of(
         cls, items: Iterable[T], columns: Mapping[str, Callable[[T], str]], caption: str = "",
         tone: Callable[[T], Tone] = lambda _: Tone.PLAIN, bar: Callable[[T], float] = lambda _: 0.0,
-    ) -> Table:  # fmt: skip
+    ) -> TableBlock:  # fmt: skip
         """A row an item; columns: by title, what they show of it."""
         rows = [Row([show(i) for show in columns.values()], tone(i), bar(i)) for i in items]
         return cls(tuple(columns), rows, caption)
@@ -173,7 +173,7 @@ class Tile:
 
 
 @dataclass(frozen=True)
-class Answer(Block):
+class AnswerBlock(Block):
     """The answer for one axis, in big words. commands: what to run next."""
 
     headline: str
@@ -194,7 +194,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Part:
+class PagePart:
     """A section of every report: its blocks for one axis, and those for all axes together."""
 
     anchor: str

@@ -7,8 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from identify.estimation.residual_dependence import Dependence
-from identify.output.numbers import Scale, capitalised, inverse, number, percent, quantity, spaced
-from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, Table
+from identify.output.numbers import (
+    DisplayUnit,
+    capitalised,
+    inverse,
+    number,
+    percent,
+    quantity,
+    spaced,
+)
+from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.fit import (
     LEAST_SHARE,
@@ -44,7 +52,7 @@ def of_model(view: AxisView) -> str:
     return f"Of the model without {view.label}. " if view.label else ""
 
 
-def regions_table(axis: AxisComparison, model: str) -> Table:
+def regions_table(axis: AxisComparison, model: str) -> TableBlock:
     """The regions whose share of the error most exceeds their share of time, in that order."""
     columns: dict[str, Callable[[Region], str]] = {
         "Where": lambda r: capitalised(place_in_words(r)).removesuffix("."),
@@ -58,10 +66,10 @@ def regions_table(axis: AxisComparison, model: str) -> Table:
         f"{model}The worst region of each coordinate, in the order of the difference of the two "
         "shares. Of a frequency band the share of time is that of the squared force."
     )
-    return Table.of(axis.worst, columns, axis.units.words(caption), bar=lambda r: r.share)
+    return TableBlock.of(axis.worst, columns, axis.units.words(caption), bar=lambda r: r.share)
 
 
-def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: str) -> Table:
+def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: str) -> TableBlock:
     """The share of the squared error of each coordinate, the largest first."""
     units = {m.coordinate: m.unit for m in maps}
     rows = [
@@ -71,12 +79,12 @@ def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: s
     ]
     beside = f" with {found}" if found else ""
     caption = f"Part of what is left{beside} that a curve over each coordinate alone accounts for."
-    return Table(("Coordinate", "Share"), rows, caption)
+    return TableBlock(("Coordinate", "Share"), rows, caption)
 
 
 def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
     """The error by frequency beside its noise."""
-    scale = Scale.of(units.force, one.rms)
+    scale = DisplayUnit.of(units.force, one.rms)
     edges = np.append(one.low, one.high[-1])
     shown = (np.where(one.visited > 0.0, one.rms, np.nan), one.floor)
     error, noise = (  # a band reaches from its lower edge to its upper: the last value stands twice
@@ -115,7 +123,7 @@ def residual_test_blocks(tests: ResidualTests, units: AxisUnits) -> list[Block]:
 
 def _histogram(tests: ResidualTests, units: AxisUnits) -> Chart:
     """Of the residual, beside the normal distribution of the noise floor."""
-    scale = Scale.of(units.force, tests.edges)
+    scale = DisplayUnit.of(units.force, tests.edges)
     edges, floor = scale(tests.edges), float(scale(tests.floor))
     density = np.append(scale.size * tests.density, np.nan)  # by the printed unit
     at = np.unique(np.concatenate([edges, np.linspace(edges[0], edges[-1], 200)]))
@@ -131,7 +139,7 @@ def _histogram(tests: ResidualTests, units: AxisUnits) -> Chart:
 
 
 def _correlation(test: Correlation) -> Chart:
-    scale, own = Scale.of("s", test.lag), test.signal == "residual"
+    scale, own = DisplayUnit.of("s", test.lag), test.signal == "residual"
     bound = np.full(len(test.lag), test.bound)
     lines = [
         Drawn("tested", np.where(test.tested, test.value, np.nan), Line.STEMS),
@@ -151,8 +159,8 @@ def _correlation(test: Correlation) -> Chart:
 def logs(view: AxisView) -> list[Block]:
     """A row for each log: force on the measured motion, position when the model runs freely."""
     axis, words = view.axis, view.words
-    force = Scale.of(view.units.force, list(axis.force_error.values()))
-    position = Scale.of(view.units.position, list(axis.position_error.values()))
+    force = DisplayUnit.of(view.units.force, list(axis.force_error.values()))
+    position = DisplayUnit.of(view.units.position, list(axis.position_error.values()))
     durations = {log.motion.name: len(log.motion.time) * log.motion.period for log in axis.logs}
     columns: dict[str, Callable[[str], str]] = {
         "Log": lambda name: name,
@@ -170,4 +178,4 @@ def logs(view: AxisView) -> list[Block]:
         f"restarts from the measured motion every {HORIZON:g} s; between restarts the position "
         "drifts with every wrong force, measurement noise included."
     )
-    return [Table.of(axis.force_error, columns, words(caption))]
+    return [TableBlock.of(axis.force_error, columns, words(caption))]

@@ -12,7 +12,7 @@ from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
 from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.output.numbers import (
-    Scale,
+    DisplayUnit,
     capitalised,
     change,
     each_with_unit,
@@ -132,7 +132,7 @@ def shape_in_words(effect: str, shape: FoundShape) -> str:
         )
     curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
     values = [float(v[at]) for v in (curve.assumed, curve.found, curve.band)]
-    scale = Scale.of(shape.force_unit, values)
+    scale = DisplayUnit.of(shape.force_unit, values)
     assumed, found, band = (number(v / scale.size) for v in values)
     place = quantity(float(shape.coordinate[at]), shape.unit)
     within = "" if shape.period is None else " of its period"

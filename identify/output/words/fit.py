@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.noise_floor import NoiseFloor
-from identify.estimation.confounded import Change, MovedParameter, Refit
+from identify.estimation.confounded import MovedParameter, ParameterShift, Refit
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (
     AlwaysAtRest,
@@ -22,7 +22,7 @@ from identify.estimation.intervals import (
 from identify.estimation.residual_dependence import Dependence, Repeat
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.numbers import (
-    Scale,
+    DisplayUnit,
     arrow,
     change,
     each_with_unit,
@@ -36,7 +36,7 @@ from identify.results.results import FitResult, SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
 from identify.validation.misfit_maps import Region
-from identify.validation.whiteness import Correlation, Loop
+from identify.validation.whiteness import Correlation, Feedback
 from twin.model.machine import Fitted
 from twin.model.units import AxisUnits, units_of
 
@@ -66,7 +66,7 @@ HELD_OUT_GREW = (
 def over_floor(unit: str, floor: float, *errors: float) -> str:
     """E.g. "noise floor 12.7 mN (ratio 4.04)", in the unit of the errors before it."""
     ratio = " -> ".join(f"{error / floor:.2f}" for error in errors)
-    return f"noise floor {Scale.of(unit, errors).text(floor)} (ratio {ratio})"
+    return f"noise floor {DisplayUnit.of(unit, errors).text(floor)} (ratio {ratio})"
 
 
 def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
@@ -75,7 +75,7 @@ def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     unit, words = fit.axis.units.force, fit.axis.units.words
     others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
     known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
-    scale = Scale.of(unit, fit.error)
+    scale = DisplayUnit.of(unit, fit.error)
     errors = (f"on the {role.value} logs {scale.text(e)}" for role, e in known.items())
     floor = over_floor(unit, fit.floor, fit.error)
     yield f"axis {axis}: {words('force error')} {', '.join(errors)}, {floor}"
@@ -103,7 +103,7 @@ def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | N
     if held is not None:
         first, after = (quantity(error, unit) for error in held)
         said += f"; on logs that were not fitted {first}, {after} now"
-    scale = Scale.of(unit, fit.starts)
+    scale = DisplayUnit.of(unit, fit.starts)
     starts = ", ".join(number(error / scale.size) for error in fit.starts)
     return [
         said,
@@ -163,7 +163,7 @@ def no_interval_in_words(reason: NoInterval) -> str:
 
 def estimate_in_words(e: Estimate, common: NoInterval | None = None) -> tuple[str, str]:
     """A value with its unit; its 90 % interval, or why it has none. common: said of all already."""
-    scale = Scale.of(e.unit, [e.value])
+    scale = DisplayUnit.of(e.unit, [e.value])
     if not e.free:
         return scale.text(e.value), "fixed"
     if e.low is None or e.high is None:
@@ -238,7 +238,7 @@ def aliasing_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
 # --- what a fit changed -----------------------------------------------------------------------
 
 
-def change_in_words(change: Change) -> str:
+def change_in_words(change: ParameterShift) -> str:
     """E.g. "mass 15 -> 15.6 kg changes the force by 0.57 N (payload_mass gives the same force)"."""
     force = units_of(change.force_unit).words("force")
     values = arrow(change.before, change.after, change.unit)
@@ -379,15 +379,15 @@ def repeat_in_words(repeat: Repeat) -> str:
 # Which residual is tested against what, and why.
 EARLIER = "so the residual is tested only against earlier values of command and speed"
 LOOPS = {
-    Loop.CLOSED: (
+    Feedback.CLOSED: (
         f"Closed loop: feedback carries position noise into the force, {EARLIER}; the free run "
         "uses the logged command."
     ),
-    Loop.OPEN: (
+    Feedback.OPEN: (
         "Open loop: the command does not depend on the measurement noise, so the residual is "
         "tested against it at all lags."
     ),
-    Loop.UNKNOWN: (
+    Feedback.UNKNOWN: (
         "The logs hold no setpoint, so the loop is taken to be closed: feedback may carry position "
         f"noise into the force, {EARLIER}."
     ),

@@ -16,7 +16,7 @@ from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.links import INERTIAL, LINK_MASS, WrongBody
-from identify.output.numbers import Scale, arrow, listed, number, percent, quantity, with_band
+from identify.output.numbers import DisplayUnit, arrow, listed, number, percent, quantity, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.results.results import Addition, Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -163,7 +163,7 @@ def supposed_in_words(plan: Plan) -> str | None:
 
 def gap_in_words(gap: Gap) -> str:
     """Which motion the logs lack."""
-    scale = Scale.of(gap.unit, [gap.low, gap.high])
+    scale = DisplayUnit.of(gap.unit, [gap.low, gap.high])
     low, high = (number(value / scale.size) for value in (gap.low, gap.high))
     where = f"{gap.feature} {low} to {high} {scale.unit}".rstrip()
     if gap.share is None:

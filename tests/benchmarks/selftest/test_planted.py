@@ -14,11 +14,11 @@ from benchmarks.selftest.laws import BUMPS, CABLES, NOISE, OUTSIDE
 from benchmarks.selftest.variations import DAMPING, VARIATIONS, Drawn, drawn_values
 from twin.effect import OUT, Effect, Excitation, Kind
 from twin.excitation import Repeating
-from twin.laws.trials import Array, Motion, trace
+from twin.laws.trials import Array, TrialMotion, trace
 
 Values = dict[str, float]
 EFFECTS = {e.name: e for e in (*BUMPS, *CABLES, NOISE, *OUTSIDE.values())}
-MOTION = Motion.random(np.random.default_rng(5), samples=300, dt=0.037)
+MOTION = TrialMotion.random(np.random.default_rng(5), samples=300, dt=0.037)
 SEEN = Excitation(-0.15, 0.15, 0.2, 0.3, 12.0, 1e-3, repeats=Repeating((7.0,), (0.02,)))
 T = MOTION.dt * np.arange(len(MOTION))
 
@@ -37,13 +37,13 @@ def from_bump(v: Values, x: Array) -> Array:
     return (turns - np.floor(turns + 0.5)) * v["pitch"]
 
 
-def gaussian(v: Values, m: Motion) -> Array:
+def gaussian(v: Values, m: TrialMotion) -> Array:
     bump = np.exp(-((from_bump(v, m.x) / (0.3 * v["width"])) ** 2))
     height = np.where(m.v > 0.0, v["ahead"], v["behind"])
     return -height * np.tanh(m.v / 2e-4) * bump
 
 
-def bulging(v: Values, m: Motion) -> Array:
+def bulging(v: Values, m: TrialMotion) -> Array:
     """The direction follows that of the motion within 60 um, averaged over a whole sample."""
     direction, followed = 0.0, []
     for speed in m.v:
@@ -58,7 +58,7 @@ def bulging(v: Values, m: Motion) -> Array:
     return -0.5 * (both * np.array(followed) + half) * bump
 
 
-REFERENCES: dict[str, Callable[[Values, Motion], Array]] = {
+REFERENCES: dict[str, Callable[[Values, TrialMotion], Array]] = {
     "gaussian_bumps": gaussian,
     "bulging_bumps": bulging,
     "folding_cable": lambda v, m: -v["offset"] - v["k1"] * v["fold"] * np.tanh(m.x / v["fold"]),
@@ -91,7 +91,7 @@ def test_a_cable_that_tightens_stops_to_tighten_at_ten_folds() -> None:
     """Beyond any travel; a law must give a number there as well."""
     effect = EFFECTS["tightening_cable"]
     values = {"offset": 0.0, "k1": 1.0, "fold": 0.01}
-    far = Motion(1e-3, np.array([0.099, 0.1, 0.2, 1e6]), *np.zeros((2, 4)))
+    far = TrialMotion(1e-3, np.array([0.099, 0.1, 0.2, 1e6]), *np.zeros((2, 4)))
     found = -trace(effect, values, far, law=effect.law).after[:, OUT]
     np.testing.assert_allclose(found, 0.01 * np.expm1([9.9, 10.0, 10.0, 10.0]), rtol=1e-9)
 
@@ -100,7 +100,7 @@ def test_noise_has_its_size_its_memory_and_four_uniform_numbers_a_sample() -> No
     """Park and Miller's numbers: 16807 times the last, modulo 2^31 - 1."""
     values = {"size": 0.4, "memory": 0.02, "seed": 7.0}
     count, dt = 20_000, 1e-3
-    still = Motion(dt, *np.zeros((3, count)))
+    still = TrialMotion(dt, *np.zeros((3, count)))
     found = trace(NOISE, values, still, law=NOISE.law).after[:, OUT]
     assert np.std(found) == pytest.approx(0.4, rel=0.1)
     assert abs(np.mean(found)) < 0.1

@@ -34,7 +34,15 @@ from benchmarks.selftest.words import (
 )
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.intervals import half_widths
-from identify.selection.findings import BY_PART, BY_T, Finding, FindingKind, Level, confidence, read
+from identify.selection.findings import (
+    BY_PART,
+    BY_T,
+    ConfidenceBin,
+    Finding,
+    FindingKind,
+    confidence,
+    read,
+)
 from twin.curve import Coordinate
 from twin.model.machine import Fitted
 
@@ -220,7 +228,7 @@ def answers(count: int, seed: int) -> list[Answer]:
 
 
 @pytest.mark.parametrize("table", [BY_PART, BY_T])
-def test_a_table_that_is_shipped_falls_and_has_no_end(table: tuple[Level, ...]) -> None:
+def test_a_table_that_is_shipped_falls_and_has_no_end(table: tuple[ConfidenceBin, ...]) -> None:
     right = [level.right for level in table]
     assert right == sorted(right, reverse=True)
     assert all(0.0 < r < 1.0 for r in right)
@@ -243,7 +251,7 @@ def test_levels_fall_and_are_as_many_as_the_answers_allow() -> None:
     right = [v.right for v in many]
     assert right == sorted(right, reverse=True)
     assert len(set(right)) == len(right)
-    assert levels([], PART) == (Level(0.0, 0.5),)
+    assert levels([], PART) == (ConfidenceBin(0.0, 0.5),)
 
 
 def test_a_table_of_some_answers_holds_on_others() -> None:

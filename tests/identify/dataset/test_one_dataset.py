@@ -25,7 +25,7 @@ from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import moving
 from identify.dataset.test_function import LEAST_BLOCKS
-from identify.dataset.time_scale import FOREIGN, HELD, Scale, beginnings
+from identify.dataset.time_scale import FOREIGN, HELD, AtLength, beginnings
 from identify.estimation.alignment import aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import error_on, fit_axis
@@ -447,7 +447,7 @@ def test_what_a_quiet_length_averages_away_asks_for_a_shorter_one():
     assert fast < still
     # At 0.5 m/s a pitch is passed in 20 ms; the quiet length averages it away.
     motion = motion_of(passes(1, 1.5, noise), "x", "log", longest_block=fast / 8.0)
-    short, long = (Scale.of(length, [motion]) for length in (fast, still))
+    short, long = (AtLength.of(length, [motion]) for length in (fast, still))
     assert short.shows_more_than(long)
     assert not long.shows_more_than(short)
 

@@ -22,7 +22,7 @@ from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.estimation.fit import Outcome, finished
 from identify.experiment_design.missing_excitation import Gap
-from identify.output.numbers import Scale, capitalised, quantity, span, typeset
+from identify.output.numbers import DisplayUnit, capitalised, quantity, span, typeset
 from identify.output.report.explorer import coordinate_of_answer, explored, shown_of
 from identify.output.report.page import Chart
 from identify.output.report.residual import regions
@@ -344,13 +344,13 @@ def test_a_sentence_of_the_terminal_is_typeset_on_a_page(said: str, printed: str
 @pytest.mark.parametrize("unit", ["N", "kg"])
 def test_a_scale_keeps_the_value(unit: str) -> None:
     for value in (3.21e-8, 4.9e-4, 5.1e-4, 0.49, 0.51, 23.0):
-        scale = Scale.of(unit, [value, -value / 3.0])
+        scale = DisplayUnit.of(unit, [value, -value / 3.0])
         assert scale(value) * scale.size == pytest.approx(value)
         prefixed = {1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}[scale.size]
         assert scale.unit == prefixed + unit
         assert unit == "kg" or scale(value) >= 0.5
         assert unit == "kg" or scale.size == 1.0 or scale(value) < 500.0
-    assert Scale.of(unit, []).size == 1.0
+    assert DisplayUnit.of(unit, []).size == 1.0
 
 
 @pytest.mark.parametrize(
@@ -363,7 +363,7 @@ def test_a_scale_keeps_the_value(unit: str) -> None:
     ],
 )
 def test_an_interval_has_two_digits_of_its_half_width(unit, ends, values, printed) -> None:
-    assert Scale.of(unit, [values[-1]]).within(*ends, *values) == printed
+    assert DisplayUnit.of(unit, [values[-1]]).within(*ends, *values) == printed
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from identify.output.text import text_of
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement
-from twin.checks import CheckReport, Fault, Finding, Severity
+from twin.checks import CheckReport, Fault, LogFinding, Severity
 from twin.curve import Coordinate
 from twin.laws import verdict
 
@@ -122,7 +122,7 @@ LAWS = [
         "b", (replace(LAW, holds=False, fault="off by 3"), replace(LAW, holds=None, fault="later"))
     ),
 ]
-LATE = Finding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
+LATE = LogFinding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
 
 TEXTS: dict[str, Callable[[], object]] = {
     "fit": made.fit_result,

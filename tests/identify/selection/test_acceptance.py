@@ -40,7 +40,7 @@ from identify.selection.acceptance import (
     score,
     taken,
 )
-from identify.selection.controls import Columns, Trial, change_control, with_unit_penalty
+from identify.selection.controls import Columns, ControlTest, change_control, with_unit_penalty
 from identify.selection.trying import reshape, try_effect
 from twin.effect import Effect, Excitation, Kind
 from twin.errors import InputError
@@ -261,11 +261,11 @@ class Planted:
 
     @property
     def part(self) -> float:
-        return Trial.beside(self.judged).part(self.columns, sticking=self.sticking)
+        return ControlTest.beside(self.judged).part(self.columns, sticking=self.sticking)
 
     @property
     def control(self) -> float:
-        return Trial.beside(self.judged).control(self.columns, sticking=self.sticking)
+        return ControlTest.beside(self.judged).control(self.columns, sticking=self.sticking)
 
 
 def planted(effect: Effect, size: float = SIZE) -> Planted:

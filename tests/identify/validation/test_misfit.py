@@ -29,7 +29,7 @@ from identify.validation.misfit_maps import (
     worst_region,
     worst_regions,
 )
-from identify.validation.whiteness import Loop, correlation, loop_of, residual_tests
+from identify.validation.whiteness import Feedback, correlation, loop_of, residual_tests
 from identify.workflow import fit
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
@@ -159,7 +159,7 @@ def test_a_comparison_gathers_what_the_residual_says():
     np.testing.assert_array_equal(where["command"], command[kept])
     worst = worst_regions(found.maps, effective_samples(found.residual))
     assert [r.coordinate for r in found.worst] == [r.coordinate for r in worst]
-    assert found.tests.loop is Loop.UNKNOWN
+    assert found.tests.loop is Feedback.UNKNOWN
 
 
 def test_it_is_where_the_force_is_that_the_model_lacks() -> None:
@@ -246,7 +246,7 @@ def test_of_a_white_residual_a_tenth_leaves_the_bounds_and_nearly_all_pass():
         drawings = (
             (white, white if name == "residual" else c) for white, c in map(drawn, range(60))
         )
-        tests = [correlation(name, [a], [b], SPACING, Loop.CLOSED) for a, b in drawings]
+        tests = [correlation(name, [a], [b], SPACING, Feedback.CLOSED) for a, b in drawings]
         assert np.mean([t.outside for t in tests]) == pytest.approx(0.1, abs=0.03)
         assert np.mean([t.passes for t in tests]) > 0.94
         assert tests[0].bound == pytest.approx(1.645 / np.sqrt(N), rel=1e-3)
@@ -256,8 +256,8 @@ def test_what_feedback_does_to_the_command_is_no_fault_of_the_model():
     """A command that answers the residual comes after it: not tested where the loop is closed."""
     white, _ = drawn(3)
     answer = -0.5 * np.roll(white, 4) + drawn(4)[0]
-    assert correlation("command", [white], [answer], SPACING, Loop.CLOSED).passes
-    opened = correlation("command", [white], [answer], SPACING, Loop.OPEN)
+    assert correlation("command", [white], [answer], SPACING, Feedback.CLOSED).passes
+    opened = correlation("command", [white], [answer], SPACING, Feedback.OPEN)
     assert not opened.passes
     assert opened.lag[np.argmax(np.abs(opened.value))] == pytest.approx(-4 * SPACING)
 
@@ -267,7 +267,7 @@ def test_gaps_and_the_seams_between_logs_do_not_count():
     holed = white.copy()
     holed[200:700] = np.nan
     test = correlation(
-        "command", [holed, white[:300]], [command, command[:300]], SPACING, Loop.OPEN
+        "command", [holed, white[:300]], [command, command[:300]], SPACING, Feedback.OPEN
     )
     assert np.isfinite(test.value).all()
     assert test.passes
@@ -285,7 +285,7 @@ def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
 
     found = tested(STAGE)
     assert found.passes
-    assert found.loop is Loop.CLOSED
+    assert found.loop is Feedback.CLOSED
     assert found.within == pytest.approx(0.9, abs=0.06)
     assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0, abs=0.02)
     poor = tested(STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab")))
@@ -298,7 +298,7 @@ def test_correlations_are_the_plain_sums_at_their_lags():
     logs = [rng.normal(0.3, 1.0, n) for n in (200, 170)]
     signals = [rng.normal(-2.0, 3.0, n) for n in (200, 170)]
     for name, other in (("command", signals), ("residual", logs)):
-        found = correlation(name, logs, other, 0.02, Loop.OPEN)
+        found = correlation(name, logs, other, 0.02, Feedback.OPEN)
         a, b = (np.concatenate(rows).mean() for rows in (logs, other))
         a, b = [r - a for r in logs], [r - b for r in other]
         size = np.sqrt(sum(np.sum(r**2) for r in a) * sum(np.sum(r**2) for r in b))
@@ -311,7 +311,7 @@ def test_correlations_are_the_plain_sums_at_their_lags():
         np.testing.assert_allclose(found.value, sums / size)
         assert found.tested.all()
     short = correlation(
-        "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Loop.OPEN
+        "command", [*logs, logs[0][:40]], [*signals, signals[0][:40]], 1.0, Feedback.OPEN
     )
     assert np.abs(short.lag).max() == 10
 
@@ -326,10 +326,10 @@ def test_a_loop_is_closed_where_the_position_follows_its_setpoint():
         more = {} if setpoint is None else {"setpoint_position": setpoint}
         return windowed(motion_of(log_of(1000.0, a, t, **more), "x", "l"))
 
-    for angle, wanted in ((0.24, Loop.CLOSED), (0.26, Loop.OPEN), (1.0, Loop.CLOSED)):
+    for angle, wanted in ((0.24, Feedback.CLOSED), (0.26, Feedback.OPEN), (1.0, Feedback.CLOSED)):
         mixed = np.cos(np.pi * angle) * a + np.sin(np.pi * angle) * b
         assert loop_of([log(mixed)]) is wanted
-    assert loop_of([log(0.0 * a)]) is Loop.OPEN
-    assert loop_of([log()]) is Loop.UNKNOWN
-    assert loop_of([log(a), log()]) is Loop.UNKNOWN
-    assert loop_of([log(0.0 * a), log(a)]) is Loop.CLOSED
+    assert loop_of([log(0.0 * a)]) is Feedback.OPEN
+    assert loop_of([log()]) is Feedback.UNKNOWN
+    assert loop_of([log(a), log()]) is Feedback.UNKNOWN
+    assert loop_of([log(0.0 * a), log(a)]) is Feedback.CLOSED

@@ -9,7 +9,7 @@ import pytest
 
 from twin.core.compiled import digest
 from twin.effects import load_catalogue
-from twin.laws.trials import Motion, forces
+from twin.laws.trials import TrialMotion, forces
 from twin.model.machine import Fitted
 
 
@@ -73,7 +73,9 @@ def test_a_law_may_call_functions_of_its_own_file(before, mark, tmp_path: Path) 
     path.write_text(LAW.format(before=before, mark=mark))
     effect = load_catalogue([path])["steady"]
     v = np.array([1.0, -1.0, 0.0])
-    found = forces([Fitted.at_start(effect, {"force": 2.0})], Motion(1e-3, 0.0 * v, v, 0.0 * v))
+    found = forces(
+        [Fitted.at_start(effect, {"force": 2.0})], TrialMotion(1e-3, 0.0 * v, v, 0.0 * v)
+    )
     np.testing.assert_array_equal(found["steady"], [-2.0, 2.0, 0.0])
     assert effect.reads("OUT")
     assert effect.reads("copysign"), "by the function that its function calls"

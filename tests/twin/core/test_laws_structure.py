@@ -14,7 +14,7 @@ from axis_runs import BOTH, RATE, Pushed, Stepper, effect, pushed, shoves
 from machines import CATALOGUE
 from scipy.integrate import solve_ivp
 
-from twin.laws.trials import Motion, forces
+from twin.laws.trials import TrialMotion, forces
 from twin.signals import Array
 
 EACH = pytest.mark.parametrize("stage", BOTH)
@@ -125,7 +125,7 @@ def test_the_way_back_gives_the_forces_of_the_way_there(names: tuple[str, ...]) 
     block = 8
     mean = 0.5 * (run.v[1:] + run.v[:-1])[:3992].reshape(-1, block).mean(axis=1)
     still = np.zeros_like(mean)
-    back = forces(parts, Motion(block * H, still, mean, still))  # of 1 kg
+    back = forces(parts, TrialMotion(block * H, still, mean, still))  # of 1 kg
     for name in (p.effect.name for p in parts):
         wanted = run.rows[name][:3992].reshape(-1, block).mean(axis=1)
         error = np.abs(MASS * back[name] - wanted)[2:-2]

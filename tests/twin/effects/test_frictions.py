@@ -15,7 +15,7 @@ from machines import CATALOGUE
 from scipy.integrate import solve_ivp
 
 from twin.core.walks import walk
-from twin.laws.trials import Motion, forces
+from twin.laws.trials import TrialMotion, forces
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.signals import Array
 
@@ -37,7 +37,7 @@ def friction(name: str, **values: float) -> Fitted:
 def along(fitted: Fitted, v: Array, dt: float) -> Array:
     """Friction on a measured velocity (n,) m/s, in the middle of each sample, (n,) N."""
     still = np.zeros_like(v)
-    return -forces([fitted], Motion(dt, still, v, still))[fitted.effect.name]
+    return -forces([fitted], TrialMotion(dt, still, v, still))[fitted.effect.name]
 
 
 def at_turns(fitted: Fitted, turns: Sequence[float], speed: float = 1e-4, leg: int = 500) -> Array:

@@ -17,7 +17,7 @@ from twin.effect import OUT, Effect, Kind, V, X
 from twin.export.c_law import SLOTS, CannotTranslate, CLaws
 from twin.export.formats.c import CSource, c_source
 from twin.feedforward import feedforward, followed
-from twin.laws.trials import Motion, companion, forces, moderate
+from twin.laws.trials import TrialMotion, companion, forces, moderate
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.signals import Array
@@ -122,7 +122,7 @@ def test_under_its_feedforward_the_equation_of_motion_holds(axis) -> None:
     motion = moves(1.0)
     kept = followed(AXES[axis]).axis
     command = feedforward(kept, motion, np.zeros_like(motion), PERIOD)
-    found = forces(kept.effects, Motion(PERIOD, motion[0], motion[1], command))
+    found = forces(kept.effects, TrialMotion(PERIOD, motion[0], motion[1], command))
     moving = motion[1] != 0.0
     structure = [f for f in kept.effects if f.effect.kind is Kind.STRUCTURE]
     assert set(found) == {f.effect.name for f in kept.effects}

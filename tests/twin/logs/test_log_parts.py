@@ -12,8 +12,15 @@ from mcap.records import ChunkIndex
 from mcap_bytes import of, parsed
 
 from twin.checks import Fault, Severity, check_log
-from twin.checks.long import Part, check_file, is_thinned, read_checked, read_measured, together
-from twin.checks.report import CheckReport, Finding
+from twin.checks.long import (
+    CheckedPart,
+    check_file,
+    is_thinned,
+    read_checked,
+    read_measured,
+    together,
+)
+from twin.checks.report import CheckReport, LogFinding
 from twin.errors import InputError
 from twin.logs import AxisLog, Log, read_log, write_log
 from twin.logs.decode import read_parts
@@ -173,12 +180,12 @@ def test_a_log_too_long_to_hold_is_checked_in_parts(tmp_path):
     assert seam.where.endswith(", and in 1 other parts")
 
 
-def finding(fault=Fault.LAG, where="whole log", severity=Severity.WARNING, what="w") -> Finding:
-    return Finding(severity, fault, "x", what, where, "r")
+def finding(fault=Fault.LAG, where="whole log", severity=Severity.WARNING, what="w") -> LogFinding:
+    return LogFinding(severity, fault, "x", what, where, "r")
 
 
-def parts_of(*reports: tuple[Finding, ...]) -> list[Part]:
-    return [Part(10.0 * i, 10.0 * i + 10.0, CheckReport(r)) for i, r in enumerate(reports)]
+def parts_of(*reports: tuple[LogFinding, ...]) -> list[CheckedPart]:
+    return [CheckedPart(10.0 * i, 10.0 * i + 10.0, CheckReport(r)) for i, r in enumerate(reports)]
 
 
 ONE, TWO = finding(where="from 3 s", what="first"), finding(where="from 4 s", what="second")

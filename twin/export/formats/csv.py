@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from twin.export import Exported, Exporter
-from twin.export.tables import Judged, exported, judged_axes
+from twin.export.tables import HeldAxis, exported, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array
@@ -18,7 +18,7 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     return exported(model, judged_axes(model, logs, lambda tables: tables), _files)
 
 
-def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
+def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
     units, of = axis.units, found.tables
     force, position = f"{units.words('force')} ({units.force})", f"({units.position})"
     place = f"{units.words('position')} {position}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.export import Exported, Exporter, Remark, filled
 from twin.export.formats.csv import csv_text
-from twin.export.tables import ENTRIES, AxisTables, Judged, exported, fewest_points, judged_axes
+from twin.export.tables import ENTRIES, AxisTables, HeldAxis, exported, fewest_points, judged_axes
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -39,7 +39,7 @@ def _points(axis: AxisModel, of: AxisTables) -> str:
     return f"{len(of.speeds)} points from 0 to {of.speeds[-1]:.3g} {axis.units.velocity}"
 
 
-def _files(name: str, axis: AxisModel, found: Judged) -> dict[str, str]:
+def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
     units, of = axis.units, found.tables
     constant = axis.hardware.force_constant
     known = constant != 1.0
