@@ -78,7 +78,7 @@ def _dynamic() -> list[Figure]:
     true = read(axis, references)
 
     def ours() -> Array:
-        prepared = datasets(model, {"sine": log}, {}, TEST_FUNCTION)[name].fit
+        prepared = datasets(model, {"sine": log}, {}, TEST_FUNCTION)[name].training
         rng = np.random.default_rng(SEED)
         return read(fit_bristles(dynamic_part_free(axis), prepared, rng), references)
 

@@ -62,7 +62,7 @@ def measure() -> list[Figure]:
     found = diagnose(model, training, chosen, tested)
     by_length = datasets(model, training, chosen, LENGTH, test=tested)
     errors = [
-        error_in(Role.TEST, fit_axis(one.final.axis, by_length[joint].fit), by_length[joint])
+        error_in(Role.TEST, fit_axis(one.final.axis, by_length[joint].training), by_length[joint])
         for joint, one in found.axes.items()
     ]
     far = [f"{e:.3g} ({p:.3g})" for e, p in zip(errors, BY_HAND, strict=True) if e > 1.1 * p]

@@ -149,13 +149,13 @@ def hidden_machine(
     )  # fmt: skip
     name, axis = next(iter(machine.axes.items()))
     dataset = datasets(machine, {"log": log}, {})[name]
-    base = fit_axis(axis, dataset.fit)
+    base = fit_axis(axis, dataset.training)
     absent = [
         effect for effect in catalogue.values()
         if effect.name not in axis.names and machine.can_use(effect) and _can_hide(effect)
     ]  # fmt: skip
     for index in rng.permutation(len(absent)):
-        hidden = draw_effect(absent[index], axis, dataset.fit, dataset.excitation, FORCE, rng)
+        hidden = draw_effect(absent[index], axis, dataset.training, dataset.excitation, FORCE, rng)
         visible = 0.5  # least part of the hidden force that a fit without the effect cannot absorb
         if hidden_part(hidden, base, dataset) < 1.0 - visible:
             return machine.with_axis(name, axis.with_effect(hidden)), hidden

@@ -388,7 +388,7 @@ def _kept(judged: Judged) -> list[tuple[PreparedLog, NDArray[np.bool_]]]:
 
 
 def _refitted(fit: Fit, dataset: Dataset) -> Fit:
-    return replace(fit_axis(fit.axis, dataset.fit), begun=fit.begun)
+    return replace(fit_axis(fit.axis, dataset.training), begun=fit.begun)
 
 
 def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:

@@ -140,8 +140,8 @@ def fit_simulation(found: FitResult, *, progress: Progress = silent) -> Simulati
     model, axes, held = found.model, {}, {}
     for i, (axis, dataset) in enumerate(found.datasets.items()):
         progress("fitting simulated motion", i, len(found.datasets))
-        done = axes[axis] = fit_simulated_motion(found.fits[axis].axis, dataset.fit)
-        others = dataset.test or dataset.holdout  # neither decides anything here
+        done = axes[axis] = fit_simulated_motion(found.fits[axis].axis, dataset.training)
+        others = dataset.test or dataset.selection  # neither decides anything here
         both = (simulated_error(a, others) for a in (done.begun, done.axis))
         held[axis] = (next(both), next(both)) if others else None
         model = model.with_axis(axis, done.axis)

@@ -119,11 +119,13 @@ def step(candidate: Candidate | str = "cogging", *level: Candidate, **told: obje
     return Step(tried(candidate), tuple(map(tried, level)), **told)  # type: ignore[arg-type]
 
 
-def dataset_stub(holdout: Sequence[object] = (), fit: Sequence[object] = ()) -> SimpleNamespace:
+def dataset_stub(
+    selection: Sequence[object] = (), training: Sequence[object] = ()
+) -> SimpleNamespace:
     """What the rules ask of a dataset, with no logs in it."""
     return SimpleNamespace(
-        axis="x", holdout=tuple(holdout), fit=tuple(fit), channel_delay=0.0,
-        chosen_on=Role.SELECTION if holdout else Role.TRAINING,
+        axis="x", selection=tuple(selection), training=tuple(training), channel_delay=0.0,
+        chosen_on=Role.SELECTION if selection else Role.TRAINING,
     )  # fmt: skip
 
 
@@ -186,5 +188,7 @@ def built_machine(
         return replace(log, command=log.command - rest - log.test_function.mean(beside) + noise)
 
     return replace(
-        dataset, fit=tuple(map(moved, dataset.fit)), holdout=tuple(map(moved, dataset.holdout))
+        dataset,
+        training=tuple(map(moved, dataset.training)),
+        selection=tuple(map(moved, dataset.selection)),
     )

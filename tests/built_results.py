@@ -74,9 +74,11 @@ LATER = candidate("lugre", 0.44, bic=205.0)
 
 CHOSEN = Passes("x", 0.0831, 0.0127, 7)
 TRIALS = (
-    SimulatedExperiment(CHOSEN, 8.3, 0.0412, 0.0113, 57.3, DATASET.fit[0], np.array([0.3, 0.1])),
     SimulatedExperiment(
-        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, DATASET.fit[1], np.array([0.2, 0.1])
+        CHOSEN, 8.3, 0.0412, 0.0113, 57.3, DATASET.training[0], np.array([0.3, 0.1])
+    ),
+    SimulatedExperiment(
+        Tracking(9.7), 9.9, 0.0287, 0.0107, 31.9, DATASET.training[1], np.array([0.2, 0.1])
     ),
 )
 
@@ -133,7 +135,7 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
     """The summary of a built diagnosis."""
     before = estimates(0.5)[::2]
     after = before if found.final is found.base else estimates(0.0)
-    floors = {Role.TRAINING: 2.03, Role.SELECTION: 2.17} if found.dataset.holdout else {}
+    floors = {Role.TRAINING: 2.03, Role.SELECTION: 2.17} if found.dataset.selection else {}
     floors = {Role.TRAINING: 2.03, **floors}
     return AxisSummary(before, after, (), found.tested, found.chosen, floors, 1.0)
 
@@ -173,7 +175,7 @@ def whiteness_of(o: float = 0.0) -> ResidualTests:
 
 
 def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
-    residual = np.concatenate([RNG.standard_normal(len(w)) for w in DATASET.fit])
+    residual = np.concatenate([RNG.standard_normal(len(w)) for w in DATASET.training])
     position = np.linspace(-0.031, 0.047, len(residual))
     place = 0.0123 + o, 0.0257 + o
     return AxisComparison(
@@ -183,7 +185,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
         position_error={"run 1": 3.17e-6 + o, "run 2": 4.29e-6 + o},
         position_floor={"run 1": 2.13e-7 + o, "run 2": 2.57e-7 + o},
         residual=residual * (0.0647 + o) / np.sqrt(np.mean(residual**2)),
-        logs=DATASET.fit,
+        logs=DATASET.training,
         coordinates={
             "position": position, "velocity": 3.0 * position[::-1],
             "roller_spikes_phase": np.mod(position, 0.034),
@@ -255,7 +257,7 @@ def simulation_fit(outcome=Outcome.CONVERGED, held=(6.1e-3, 4.3e-3)) -> Simulati
     where = free_parameters(PLAIN)
     now = write(PLAIN, where, read(PLAIN, where) * 1.07)
     beginnings = [Beginning(3, 0.011, -0.21, np.zeros(1)), Beginning(5, 0.013, 0.23, np.zeros(1))]
-    logs = built_dataset("one", "two").fit
+    logs = built_dataset("one", "two").training
     fit = MotionFit(now, PLAIN, logs, beginnings, outcome, (7.1e-3, 5.3e-3, 9.7e-3))
     fit.__dict__["errors"] = (np.array([3e-3, -4e-3]),)
     fit.__dict__["error_begun"] = 8.5e-3

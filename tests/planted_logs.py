@@ -107,7 +107,7 @@ def begun(
 ) -> tuple[Fit, Dataset]:
     """The axis fitted to these logs, and their dataset."""
     dataset = datasets(MachineModel("m", {"x": axis}, RATE), logs, held, test=test)["x"]
-    return fit_axis(axis, dataset.fit), dataset
+    return fit_axis(axis, dataset.training), dataset
 
 
 def asked(

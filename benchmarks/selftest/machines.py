@@ -203,11 +203,11 @@ def prepared(built: Machine, strength: float) -> Dataset:
     """
     dataset = datasets(built.model, built.logs, built.holdout, test=built.test)[AXIS]
     true = built.true.axes[AXIS]
-    own = own_error(true, dataset.fit)
+    own = own_error(true, dataset.training)
     for planted in (f.effect for f in built.planted):
         if planted.kind is Kind.FRICTION or planted.is_noise:
             continue
-        without = own_error(true.without(planted.name), dataset.fit)
+        without = own_error(true.without(planted.name), dataset.training)
         if without**2 - own**2 < (REACHED * strength * own) ** 2:
             raise NotShown(planted.name)
     return dataset
@@ -258,8 +258,8 @@ class _Trial:
         """On the motions of all training logs, as an end may be met in some alone."""
         logs = _logged(drawn.true, runs, ReducedSimulator)
         dataset = datasets(drawn.model, logs, {})[AXIS]
-        base = fit_axis(drawn.model.axes[AXIS], dataset.fit)
-        return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset.fit))
+        base = fit_axis(drawn.model.axes[AXIS], dataset.training)
+        return cls(dataset, base, own_error(drawn.true.axes[AXIS], dataset.training))
 
 
 def plain_friction(stage: MachineModel, other: Effect) -> Fitted:
@@ -304,7 +304,7 @@ def _with_friction(
     def left(new: Fitted) -> float:
         """Error of the model beyond that of one with the right friction, in noise floors."""
         trial = _Trial.of(having(new), runs)
-        best = fit_axis(trial.base.axis.with_effect(new), trial.dataset.fit).error
+        best = fit_axis(trial.base.axis.with_effect(new), trial.dataset.training).error
         beyond = max(trial.base.error**2 - max(best, trial.floor) ** 2, 1e-4 * trial.floor**2)
         return float(np.sqrt(beyond) / trial.floor)
 
@@ -351,7 +351,7 @@ def _with_planted(
         fitted = _scaled(effect, values, strength, trial, rng)
         if hidden_part(fitted, trial.base, trial.dataset) > HIDDEN:
             weighed = replace(trial.base.axis, mass_fixed=True, mass=drawn.true.axes[AXIS].mass)
-            held = replace(trial, base=fit_axis(weighed, trial.dataset.fit))
+            held = replace(trial, base=fit_axis(weighed, trial.dataset.training))
             fitted = _scaled(effect, values, strength, held, rng)
         else:
             held = trial
@@ -376,7 +376,7 @@ def _scaled(
     rng: np.random.Generator,
 ) -> Fitted:
     """The effect so strong that the model cannot reproduce ``strength`` noise floors of it."""
-    base, logs = trial.base, trial.dataset.fit
+    base, logs = trial.base, trial.dataset.training
     without = residual(base.axis, logs)
 
     def beyond(fitted: Fitted) -> np.ndarray:

@@ -225,7 +225,7 @@ def _planted_force(planted: tuple[Fitted, ...], base: Fit, dataset: Dataset) -> 
     axis = base.axis
     for fitted in planted:
         axis = axis.with_effect(fitted)
-    force = base.residual - residual(axis, dataset.fit)[base.kept]
+    force = base.residual - residual(axis, dataset.training)[base.kept]
     return unabsorbed(force, base.basis)
 
 

@@ -251,4 +251,4 @@ def cable_force(
     the logs hold fewer than two passes each way.
     """
     name, dataset = only_axis(datasets(model, logs_by_name(logs), {}, test_function), axis)
-    return CableForce.of(Passes.of(model.axes[name], dataset.fit))
+    return CableForce.of(Passes.of(model.axes[name], dataset.training))

@@ -48,7 +48,7 @@ def dynamic_friction(
     """
     name, dataset = only_axis(datasets(model, logs_by_name(logs), {}, test_function), axis)
     known = dynamic_part_free(model.axes[name])
-    return fit_dynamic_part(known, dataset.fit, np.random.default_rng(seed))
+    return fit_dynamic_part(known, dataset.training, np.random.default_rng(seed))
 
 
 def dynamic_part_free(axis: AxisModel) -> AxisModel:

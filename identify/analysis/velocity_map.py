@@ -208,4 +208,4 @@ def _maps(
     """The axis, and the map of each log."""
     name, dataset = only_axis(datasets(model, logs_by_name(logs), {}), axis)
     own = model.axes[name]
-    return own, [VelocityMap.of(own, log.motion) for log in dataset.fit]
+    return own, [VelocityMap.of(own, log.motion) for log in dataset.training]

@@ -32,7 +32,7 @@ class Role(Enum):
 class Dataset:
     """One axis: its prepared logs by role, and what they cover.
 
-    fit: the training logs. holdout: the selection logs (may be none), which take part in the choice
+    training: parameters are fitted on them. selection (may be none): they take part in the choice
     of effects; no parameter is fitted on them. test: the test logs (may be none), on which nothing
     is decided. covered: gives what the training logs cover, which takes a while. channel_delay: s,
     by which the force of the logs was shifted to earlier samples. left_out: the logs that say
@@ -41,8 +41,8 @@ class Dataset:
     """
 
     axis: str
-    fit: tuple[PreparedLog, ...]
-    holdout: tuple[PreparedLog, ...]
+    training: tuple[PreparedLog, ...]
+    selection: tuple[PreparedLog, ...]
     covered: Callable[[], Excitation]
     channel_delay: float = 0.0
     left_out: Mapping[str, str] = field(default_factory=dict)
@@ -57,13 +57,13 @@ class Dataset:
     @property
     def beyond(self) -> dict[str, float]:
         """Part of each log, 0..1 by name, that lies where no training log has been."""
-        others = (*self.holdout, *self.test)
+        others = (*self.selection, *self.test)
         parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in others}
         return {name: part for name, part in parts.items() if part > 0.0}
 
     def __repr__(self) -> str:
-        fit, holdout, test = (len(self.having(role)) for role in Role)
-        return f"<Dataset of {self.axis}: logs: {fit} training, {holdout} selection, {test} test>"
+        counts = ", ".join(f"{len(self.having(role))} {role.value}" for role in Role)
+        return f"<Dataset of {self.axis}: logs: {counts}>"
 
     @property
     def excitation(self) -> Excitation:
@@ -73,17 +73,19 @@ class Dataset:
     @property
     def logs(self) -> tuple[PreparedLog, ...]:
         """All logs: training, selection, test."""
-        return (*self.fit, *self.holdout, *self.test)
+        return (*self.training, *self.selection, *self.test)
 
     def having(self, role: Role) -> tuple[PreparedLog, ...]:
         """The logs of a role."""
-        return {Role.TRAINING: self.fit, Role.SELECTION: self.holdout, Role.TEST: self.test}[role]
+        return {Role.TRAINING: self.training, Role.SELECTION: self.selection, Role.TEST: self.test}[
+            role
+        ]
 
     def with_logs(self, logs: Iterable[PreparedLog]) -> Dataset:
         """The same with other logs in the place of ``logs``, in that order."""
         others = iter(logs)
-        fit, holdout, test = (tuple(islice(others, len(self.having(role)))) for role in Role)
-        return replace(self, fit=fit, holdout=holdout, test=test)
+        training, selection, test = (tuple(islice(others, len(self.having(role)))) for role in Role)
+        return replace(self, training=training, selection=selection, test=test)
 
     def forget(self) -> None:
         """Let go of what is made of the columns of its logs, where these are held."""
@@ -94,7 +96,7 @@ class Dataset:
     @property
     def chosen_on(self) -> Role:
         """Role of the logs that choose; without selection logs they are the training logs."""
-        return Role.SELECTION if self.holdout else Role.TRAINING
+        return Role.SELECTION if self.selection else Role.TRAINING
 
     @property
     def tested_on(self) -> Role:
@@ -105,8 +107,10 @@ class Dataset:
     def heads(self) -> tuple[PreparedLog, ...]:
         """The beginnings of the training logs, long enough to scan nonlinear parameters on."""
         # 8 s of motion on which nonlinear parameters are scanned before all of it is used
-        each = 8.0 / min(len(self.fit), 4)  # less of a log tells little
-        return tuple(PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.fit)
+        each = 8.0 / min(len(self.training), 4)  # less of a log tells little
+        return tuple(
+            PreparedLog.of(w.motion.head(each), w.test_function.length) for w in self.training
+        )
 
     @cached_property
     def part(self) -> Dataset:
@@ -119,7 +123,7 @@ class Dataset:
     def _shortened(self, seconds: float) -> Dataset:
         # A beginning is whole blocks, and may be longer by half a one.
         lengths = (
-            (_length(w) - w.motion.period for w in logs) for logs in (self.fit, self.holdout)
+            (_length(w) - w.motion.period for w in logs) for logs in (self.training, self.selection)
         )
         if all(sum(own) <= seconds for own in lengths):
             return self
@@ -134,18 +138,18 @@ class Dataset:
                 for w in logs
             )
 
-        return replace(self, fit=cut(self.fit), holdout=cut(self.holdout))
+        return replace(self, training=cut(self.training), selection=cut(self.selection))
 
     @cached_property
     def in_heads(self) -> NDArray[np.bool_]:
         """Which test functions of the training logs are in their heads."""
-        pairs = zip(self.heads, self.fit, strict=True)
+        pairs = zip(self.heads, self.training, strict=True)
         return np.concatenate([np.arange(len(w)) < len(h) for h, w in pairs])
 
     @property
     def force_noise(self) -> float:
         """N RMS by test functions, of force noise that no sensor makes."""
-        return max(log.force_noise for log in self.fit)
+        return max(log.force_noise for log in self.training)
 
     def with_force_noise(self, size: float) -> Dataset:
         """The same with force noise that no sensor makes, N RMS by test functions, in all logs."""
@@ -154,12 +158,12 @@ class Dataset:
     @property
     def units(self) -> AxisUnits:
         """The units of the axis."""
-        return self.fit[0].motion.units
+        return self.training[0].motion.units
 
     @property
     def test_function_length(self) -> float:
         """Length of the test functions, s."""
-        return self.fit[0].test_function.length
+        return self.training[0].test_function.length
 
 
 def _length(log: PreparedLog) -> float:
@@ -171,6 +175,6 @@ def by_log(found: Mapping[str, Dataset]) -> dict[str, dict[str, PreparedLog]]:
     """The logs to fit by name, each prepared for the axes that move in it."""
     out: dict[str, dict[str, PreparedLog]] = {}
     for axis, dataset in found.items():
-        for log in dataset.fit:
+        for log in dataset.training:
             out.setdefault(log.motion.name, {})[axis] = log
     return out

@@ -116,8 +116,8 @@ def _of_axis(
     )
     return Dataset(
         axis=name,
-        fit=tuple(spread(partial(PreparedLog.of, length=length), fit)),
-        holdout=_within_reach(held, length, fit),
+        training=tuple(spread(partial(PreparedLog.of, length=length), fit)),
+        selection=_within_reach(held, length, fit),
         test=_within_reach(test, length, fit),
         covered=cache(partial(excitation, fit, axis.hardware.travel)),
         begun=begun,
@@ -207,7 +207,9 @@ def telling(dataset: Dataset, sticks: bool) -> Dataset:
     fit, holdout, test = (
         tuple(log for log in dataset.having(role) if log.motion.name not in silent) for role in Role
     )
-    return replace(dataset, fit=fit or dataset.fit, holdout=holdout, test=test, left_out=left_out)
+    return replace(
+        dataset, training=fit or dataset.training, selection=holdout, test=test, left_out=left_out
+    )
 
 
 def _why(log: PreparedLog, axis: str) -> str:

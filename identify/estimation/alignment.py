@@ -54,10 +54,10 @@ def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
 
     No parameter is fitted; ``fit_aligned`` does the same together with a fit.
     """
-    fit = finished(axis, axis, dataset.fit, Outcome.CONVERGED)
+    fit = finished(axis, axis, dataset.training, Outcome.CONVERGED)
     while len(fit.residual) and (shift := misalignment(fit, dataset)):
         moved = realigned(dataset, dataset.channel_delay + shift)
-        again = finished(axis, axis, moved.fit, Outcome.CONVERGED)
+        again = finished(axis, axis, moved.training, Outcome.CONVERGED)
         if again.error > RULE.fallen * fit.error:
             break
         dataset, fit = moved, again
@@ -71,7 +71,9 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     fit. Where the dataset has a channel delay already, the result is the change of it; the delay as
     a whole is never negative.
     """
-    rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.fit])[fit.kept]
+    rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.training])[
+        fit.kept
+    ]
     left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
     power = float(own @ own)
     if power <= ROUNDING * float(rate @ rate):
@@ -79,7 +81,9 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     shift = -float(own @ left) / power
     after = left + shift * own
     fallen = rms(after) < RULE.fallen * rms(left)
-    samples = (dataset.channel_delay + shift) / max(w.motion.sample_period for w in dataset.fit)
+    samples = (dataset.channel_delay + shift) / max(
+        w.motion.sample_period for w in dataset.training
+    )
     possible = RULE.least_shift < samples < RULE.most_shift
     told = possible and fallen and evidence(left, after, 1).delta_bic > RULE.least_bic
     return shift if told else 0.0
@@ -95,7 +99,7 @@ def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
     if dataset.channel_delay == 0.0:
         return None
     back = realigned(dataset, 0.0)
-    return back if fit_axis(fit.axis, back.fit).error < RULE.fallen * fit.error else None
+    return back if fit_axis(fit.axis, back.training).error < RULE.fallen * fit.error else None
 
 
 def realigned(dataset: Dataset, shift: float) -> Dataset:
@@ -122,7 +126,7 @@ def with_time_origins(axis: AxisModel, dataset: Dataset) -> Dataset:
     seen = [_left(rest, log) for log in logs]
     line = _own_line(axis, rest, logs[0])
     if line is None and len(logs) > 1:
-        line = _common_line(logs[: len(dataset.fit)], seen[: len(dataset.fit)])
+        line = _common_line(logs[: len(dataset.training)], seen[: len(dataset.training)])
     if line is None:
         return dataset
     frequency, phase = line
@@ -144,7 +148,7 @@ def synchronised(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
         return dataset, fit
     found = with_time_origins(fit.axis, dataset)
     same = np.array_equal(time_origins(found), time_origins(dataset))
-    return found, fit if same else replace(fit, logs=found.fit)
+    return found, fit if same else replace(fit, logs=found.training)
 
 
 def time_origins(dataset: Dataset) -> Array:
@@ -160,12 +164,12 @@ def begun_at(dataset: Dataset, begun: Array) -> Dataset:
 
 def depends_on_time_origin(axis: AxisModel, dataset: Dataset) -> bool:
     """Whether a force of the axis depends on when a log began."""
-    return len(without_timed_forces(axis, dataset.fit[0]).effects) < len(axis.effects)
+    return len(without_timed_forces(axis, dataset.training[0]).effects) < len(axis.effects)
 
 
 def phases_found(axis: AxisModel, effect: str, dataset: Dataset) -> int:
     """How many phases of training logs an effect of the axis has, beside its parameters."""
-    found = [log for log in dataset.fit if log.motion.time_origin]
+    found = [log for log in dataset.training if log.motion.time_origin]
     alone = replace(axis, effects=(axis[effect],))
     return len(found) if found and depends_on_time_origin(alone, dataset) else 0
 

@@ -147,7 +147,7 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 
 def require_residual(axis: AxisModel, dataset: Dataset) -> None:
     """Raise InputError where no test function is usable, or the residual is not a number."""
-    kept = moving(dataset.fit, sticks(axis))
+    kept = moving(dataset.training, sticks(axis))
     if not kept.any():
         raise InputError(
             f"axis {dataset.axis} comes to rest within every test function of "
@@ -156,7 +156,7 @@ def require_residual(axis: AxisModel, dataset: Dataset) -> None:
             "--test-function (s)"
         )
     with np.errstate(all="ignore"):
-        require_finite(residual(axis, dataset.fit)[kept], dataset)
+        require_finite(residual(axis, dataset.training)[kept], dataset)
 
 
 def require_finite(left: Array, dataset: Dataset) -> None:
@@ -170,7 +170,7 @@ def require_finite(left: Array, dataset: Dataset) -> None:
 
 
 def _names(dataset: Dataset) -> str:
-    return ", ".join(log.motion.name for log in dataset.fit)
+    return ", ".join(log.motion.name for log in dataset.training)
 
 
 def group_of(axis: AxisModel, effect: str) -> AxisModel:

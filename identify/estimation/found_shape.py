@@ -71,10 +71,10 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
 
     The force of the law is read off where the curve lies: its mean over what else it depends on.
     """
-    mask = moving(dataset.fit, sticking(fit.axis, shape))[fit.kept]
+    mask = moving(dataset.training, sticking(fit.axis, shape))[fit.kept]
     without = fit.axis.without(shape.effect)
     linear = Linearised.about(fit, dataset, shape.empty, mask, less=shape.effect)
-    law = averaged_force(fit.axis, dataset.fit) - averaged_force(without, dataset.fit)
+    law = averaged_force(fit.axis, dataset.training) - averaged_force(without, dataset.training)
     own = np.array([c.effect == shape.empty.effect.name for c in linear.where])
     names = [c.parameter.name for c, is_own in zip(linear.where, own, strict=True) if is_own]
     hats = linear.columns[:, len(own) - len(names) :]  # which come last
@@ -112,7 +112,7 @@ def _covered(shape: Shape, dataset: Dataset) -> tuple[float, float]:
         Coordinate.POSITION: lambda m: m.position,
         Coordinate.SPEED: lambda m: np.abs(m.velocity),
     }
-    where = np.concatenate([been[shape.curve.over](log.motion) for log in dataset.fit])
+    where = np.concatenate([been[shape.curve.over](log.motion) for log in dataset.training])
     return float(where.min()), float(where.max())
 
 

@@ -138,7 +138,9 @@ def _chosen(fit: Fit, dataset: Dataset, law: Fitted, curve: Curve) -> Shape | No
 
 def _both_ways(fit: Fit, dataset: Dataset) -> bool:
     """Whether each direction has a fifth of the motion: of fewer, a curve is a guess."""
-    velocity = np.concatenate([log.test_function.mean(log.motion.velocity) for log in dataset.fit])
+    velocity = np.concatenate(
+        [log.test_function.mean(log.motion.velocity) for log in dataset.training]
+    )
     ahead = float(np.mean(velocity[fit.kept] > 0.0))
     return min(ahead, 1.0 - ahead) >= RULE.least_part
 
@@ -150,7 +152,7 @@ def _smoothed(
     shape = _laid(fit.axis, law, curve, dataset, lets_go)
     if shape is None:
         return None, np.inf
-    mask = moving(dataset.fit, sticking(fit.axis, shape))[fit.kept]
+    mask = moving(dataset.training, sticking(fit.axis, shape))[fit.kept]
     linear = Linearised.about(fit, dataset, shape.empty, mask)
     stiffness = choose_stiffness(linear, COARSELY)
     if not stiffness:

@@ -107,7 +107,7 @@ def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
     shares, lines = _shares(base.residual, *_where(base, dataset))
     name = _foremost(shares)
-    unit = unit_of(name, dataset.fit[0].motion)
+    unit = unit_of(name, dataset.training[0].motion)
     return Dependence(shares[name], name, lines.get(name), unit, shares)
 
 
@@ -118,10 +118,10 @@ def dependences(force: Array, fit: Fit, dataset: Dataset) -> dict[str, float]:
 
 def _where(fit: Fit, dataset: Dataset) -> tuple[dict[str, Array], NDArray[np.int64]]:
     """Coordinates of the windows of a fit, and where those of each log but the first begin."""
-    ends = np.cumsum([len(log) for log in dataset.fit])
+    ends = np.cumsum([len(log) for log in dataset.training])
     kept = np.concatenate([[0], np.cumsum(fit.kept)])
     begins = np.unique(kept[ends])  # a log at rest throughout has none
-    where = {k: v[fit.kept] for k, v in gathered(dataset.fit).items()}
+    where = {k: v[fit.kept] for k, v in gathered(dataset.training).items()}
     return where, begins[(begins > 0) & (begins < kept[-1])]
 
 
@@ -192,7 +192,7 @@ class Repeat:
 
 def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     """The strongest force that repeats in position in every log with another phase, if any."""
-    logs = (*dataset.fit, *dataset.holdout)
+    logs = (*dataset.training, *dataset.selection)
     if len(logs) < 2:
         return None
     records = [Record(log.motion.position, _left_on_blocks(fit, log)) for log in logs]

@@ -152,7 +152,10 @@ class Remainder:
 def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
     gaussian, laplace = 3.0, 6.0  # kurtosis of these noises
-    logs = (*dataset.fit, *dataset.holdout)  # one does not tell: where it is once predicts nothing
+    logs = (
+        *dataset.training,
+        *dataset.selection,
+    )  # one does not tell: where it is once predicts nothing
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
     # 0.5 of the force, RMS: a larger rest is of another machine
     if len(logs) == 1 or fit.error > 0.5 * rms(command):
@@ -168,7 +171,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     if kurtosis > laplace:
         return False
     alike = 1.5  # times the error of the training logs that noise may have on others
-    larger = dataset.holdout and rms(error_on(fit.axis, dataset.holdout)) > alike * fit.error
+    larger = dataset.selection and rms(error_on(fit.axis, dataset.selection)) > alike * fit.error
     return not larger and not rest.size_is_predictable()
 
 
@@ -178,12 +181,12 @@ def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:
         return dataset, fit
     own = np.sqrt(fit.error**2 - fit.floor**2 + dataset.force_noise**2)
     dataset = dataset.with_force_noise(float(own))
-    return dataset, finished(fit.axis, fit.begun, dataset.fit, fit.outcome)
+    return dataset, finished(fit.axis, fit.begun, dataset.training, fit.outcome)
 
 
 def noise_known(axis: AxisModel, dataset: Dataset) -> Dataset:
     """The dataset with what an axis, as it is given, leaves as part of the noise, if it is."""
-    return with_own_noise(finished(axis, axis, dataset.fit, Outcome.CONVERGED), dataset)[0]
+    return with_own_noise(finished(axis, axis, dataset.training, Outcome.CONVERGED), dataset)[0]
 
 
 def _kurtosis(force: Array) -> float:

@@ -67,7 +67,7 @@ class Linearised:
         columns[:, :first] = base.jacobian[np.ix_(some, rest)]
         asked, end = np.zeros(len(base.kept), dtype=bool), 0
         asked[np.flatnonzero(base.kept)[some]] = True
-        for log, kept in zip(dataset.fit, split_by_log(asked, dataset.fit), strict=True):
+        for log, kept in zip(dataset.training, split_by_log(asked, dataset.training), strict=True):
             begin, end = end, end + int(kept.sum())  # one by one: there are many columns
             columns[begin:end, first:] = jacobian(alone, [log], own, kept)
         norms = np.linalg.norm(base.jacobian, axis=0)[rest]

@@ -198,7 +198,7 @@ class _Ground:
         among = dataset.in_heads if on_heads else np.ones(len(base.kept), dtype=bool)
         return cls(
             excitation=excitation,
-            logs=dataset.heads if on_heads else dataset.fit,
+            logs=dataset.heads if on_heads else dataset.training,
             effect=effect,
             rest=rest,
             basis=basis_beside(base, dataset if on_heads else None, rest.names),
@@ -269,8 +269,8 @@ def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = 
     """
     if dataset.part is not dataset:
         shaped = fit_multistart(axis, dataset.part).axis
-        return replace(fit_axis(shaped, dataset.fit), begun=begun or axis)
-    best = fit_axis(axis, dataset.fit)
+        return replace(fit_axis(shaped, dataset.training), begun=begun or axis)
+    best = fit_axis(axis, dataset.training)
     if begun is not None:
         best = replace(best, begun=begun)
     for name in axis.names:
@@ -285,7 +285,7 @@ def fit_multistart(axis: AxisModel, dataset: Dataset, begun: AxisModel | None = 
         first = found.fitted
         held = {n: best.axis[name].values[n] for n in best.axis[name].fixed}
         again = replace(first, values={**first.values, **held}, fixed=best.axis[name].fixed)
-        other = fit_axis(best.axis.with_effect(again), dataset.fit)
+        other = fit_axis(best.axis.with_effect(again), dataset.training)
         if other.error < BETTER * best.error:
             best = replace(other, begun=best.begun)
     return best
@@ -316,7 +316,7 @@ def _is_nearest(shape: dict[str, float], present: Fitted, excitation: Excitation
 
 def fit_without(fit: Fit, dataset: Dataset, name: str) -> Fit:
     """The fit with one effect removed and the values of the others unchanged."""
-    return finished(fit.axis.without(name), fit.begun, dataset.fit, fit.outcome)
+    return finished(fit.axis.without(name), fit.begun, dataset.training, fit.outcome)
 
 
 def absent_effects(axis: AxisModel, catalogue: Catalogue) -> list[Effect]:

@@ -226,7 +226,7 @@ def _arena(
     own, logs = model.axes[dataset.axis], tuple[PreparedLog, ...]()
     if recorded:
         dataset, base = fit_aligned(own, dataset)
-        own, logs = base.axis, dataset.fit
+        own, logs = base.axis, dataset.training
     known: tuple[Explanation, ...] = (Explanation(model.name, own),)
     if between:
         known = explained(between, model, dataset, recorded)
@@ -262,4 +262,4 @@ def _between_candidates(
     model: MachineModel, dataset: Dataset, rivals: Sequence[Candidate], test_function: float | None
 ) -> Arena:
     known = tuple(Explanation(c.effect.name, c.fit.axis) for c in rivals)
-    return Arena(model, dataset.axis, known, dataset.fit, test_function)
+    return Arena(model, dataset.axis, known, dataset.training, test_function)

@@ -145,7 +145,9 @@ def hidden_part(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
 
 
 def _beside(fitted: Fitted, base: Fit, dataset: Dataset) -> Array:
-    return added_force(fitted, base.axis, dataset.fit, residual(base.axis, dataset.fit))[base.kept]
+    return added_force(fitted, base.axis, dataset.training, residual(base.axis, dataset.training))[
+        base.kept
+    ]
 
 
 def added_force(

@@ -76,14 +76,14 @@ def explained(
 def _supposed(effect: Effect, axis: AxisModel, dataset: Dataset) -> AxisModel:
     """The axis with the effect at start values and a force above the noise floor."""
     if effect.kind is Kind.FRICTION:  # fitted, as it replaces the friction of the axis
-        first = start_values(fit_axis(axis, dataset.fit), dataset, effect)[0]
-        return fit_axis(axis.with_effect(first.fitted), dataset.fit).axis
-    without = residual(axis, dataset.fit)
+        first = start_values(fit_axis(axis, dataset.training), dataset, effect)[0]
+        return fit_axis(axis.with_effect(first.fitted), dataset.training).axis
+    without = residual(axis, dataset.training)
 
     def added(fitted: Fitted) -> Array:
-        return residual(axis.with_effect(fitted), dataset.fit) - without
+        return residual(axis.with_effect(fitted), dataset.training) - without
 
-    force, starts = STRENGTH * floor_of(axis, dataset.fit), effect.starts(dataset.excitation)
+    force, starts = STRENGTH * floor_of(axis, dataset.training), effect.starts(dataset.excitation)
     return axis.with_effect(strength_for(effect, added, force, starts))
 
 

@@ -176,7 +176,7 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
         tested=found.tested,
         chosen=found.chosen,
         floors=floors,
-        selection_ratio=judged.other_error / judged.other_floor if dataset.holdout else None,
+        selection_ratio=judged.other_error / judged.other_floor if dataset.selection else None,
         noise=final.noise,
     )
 

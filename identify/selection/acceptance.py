@@ -126,7 +126,7 @@ class Judged:
     @cached_property
     def other(self) -> Array:
         """The same (m,) N of logs that were not fitted."""
-        fit, logs = self.fit, self.dataset.holdout
+        fit, logs = self.fit, self.dataset.selection
         if not logs:
             columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
             rows = self._smoothing
@@ -154,7 +154,7 @@ class Judged:
     @cached_property
     def other_floor(self) -> float:
         """Noise floor of the logs that were not fitted, N RMS."""
-        holdout = self.dataset.holdout
+        holdout = self.dataset.selection
         return floor_of(self.fit.axis, holdout) if holdout else self.fit.floor
 
     @cached_property
@@ -169,13 +169,13 @@ class Judged:
     @property
     def other_at_floor(self) -> bool:
         """Whether noise is all that is left on logs that were not fitted; not of none."""
-        error, held = self.other_error, bool(self.dataset.holdout)
+        error, held = self.other_error, bool(self.dataset.selection)
         return held and error < RULE.at_floor * self.other_floor
 
     @property
     def at_floor(self) -> bool:
         """Whether noise is all that is left, on the training logs and on those not fitted."""
-        tells = self.dataset.holdout and np.isfinite(self.other_error)
+        tells = self.dataset.selection and np.isfinite(self.other_error)
         return self.fit.at_floor and (self.other_at_floor or not tells)
 
 

@@ -153,8 +153,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
 
 def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
     """Whether most of a force in time is told by where the axis is, how fast, and how it turns."""
-    force = averaged_force(alone, dataset.fit)
-    where = gathered(dataset.fit)
+    force = averaged_force(alone, dataset.training)
+    where = gathered(dataset.training)
     return _is_of(force, np.column_stack([np.ones(len(force)), *(where[name] for name in MOTION)]))
 
 
@@ -170,10 +170,10 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
     Masses and centres of a file, and the torque constants of motors, are seldom better than a
     tenth: two models of one machine by its own makers differ by as much.
     """
-    if any(log.motion.bodies is None for log in dataset.fit):
+    if any(log.motion.bodies is None for log in dataset.training):
         return False
-    force = averaged_force(alone, dataset.fit)
-    rows = (log.test_function.mean(log.motion.joint_signals) for log in dataset.fit)
+    force = averaged_force(alone, dataset.training)
+    rows = (log.test_function.mean(log.motion.joint_signals) for log in dataset.training)
     _, _, _, load, *_ = np.hstack([*rows])
     if not load.any():
         return False
@@ -191,7 +191,7 @@ def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
     if None in laws:
         return False
     axes = (replace(alone, effects=(law,)) for law in laws if law)
-    now, was, begun, own = (averaged_force(axis, before.dataset.fit) for axis in axes)
+    now, was, begun, own = (averaged_force(axis, before.dataset.training) for axis in axes)
     least = min(float(was @ was), float(begun @ begun))
     return float(now @ now) < RULE.collapse**2 * least and _is_of(was - now, own[:, None])
 
@@ -203,7 +203,7 @@ def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
     the steps are seen in the readings, whatever else is left.
     """
     dataset, fit = before.dataset, after.fit
-    logs = (*dataset.fit, *dataset.holdout)
+    logs = (*dataset.training, *dataset.selection)
     left = error_on(fit.axis, logs)
     error, noise = rms(left), noise_beside(fit.axis, logs)
     floor, rounds = noise.value, noise.parts["rounding"]

@@ -119,7 +119,7 @@ class Added:
         return Screening(self, most, tuple(f.axis for f in (first, *others)))
 
     def refit(self, judged: Judged, screening: Screening) -> Fit:
-        return simplified(fit_axis(screening.axes[0], judged.dataset.fit), judged, self.effect)
+        return simplified(fit_axis(screening.axes[0], judged.dataset.training), judged, self.effect)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
         return axis_less(self.effect, axis, base) if self.name in axis.names else None
@@ -165,7 +165,7 @@ class Freed:
         return Screening(self, promise, tuple(axes))
 
     def refit(self, judged: Judged, screening: Screening) -> Fit:
-        return fit_axis(screening.axes[0], judged.dataset.fit)
+        return fit_axis(screening.axes[0], judged.dataset.training)
 
     def undone(self, axis: AxisModel, base: AxisModel) -> AxisModel | None:
         law = axis[self.name] if self.name in axis.names else None
@@ -209,7 +209,7 @@ class Reshaped:
         return axis if rubs or self.name in axis.names else axis.with_effect(self.law)
 
     def columns(self, without: Judged, fit: Judged) -> tuple[Columns, bool]:
-        axis, logs = without.fit.axis, without.dataset.fit
+        axis, logs = without.fit.axis, without.dataset.training
         resting = sticking(axis, self.shape)
         samples = int(np.count_nonzero(moving(logs, resting)))
         return columns_of(axis, self.shape, samples), resting
@@ -241,7 +241,7 @@ def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
     The effect was missing when the base was fitted, which distorts its values, so one start has
     those that the base began with.
     """
-    change, logs, axes = screening.change, judged.dataset.fit, screening.axes[1:]
+    change, logs, axes = screening.change, judged.dataset.training, screening.axes[1:]
     if not isinstance(change, Added):
         return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
     begun = judged.fit.begun.with_effect(first.axis[change.name])
@@ -325,5 +325,5 @@ def _resting(without: Judged, fit: Judged) -> bool:
 def _before_a_friction(fit: Fit, dataset: Dataset) -> tuple[tuple[Logs, Array], ...]:
     """Heads and training logs, with the residual (n,) N of an axis fitted to each."""
     refitted = fit_axis(fit.axis, dataset.heads).axis
-    pairs = ((dataset.heads, refitted), (dataset.fit, fit.axis))
+    pairs = ((dataset.heads, refitted), (dataset.training, fit.axis))
     return tuple((logs, residual(axis, logs)) for logs, axis in pairs)

@@ -50,7 +50,7 @@ class ControlTest:
     @lru_cache(maxsize=2)  # every change is tried beside the same fit, and its controls again
     def beside(cls, judged: Judged) -> ControlTest:
         """The trial beside a fit."""
-        fit, holdout = judged.fit, judged.dataset.holdout
+        fit, holdout = judged.fit, judged.dataset.selection
         size = unit_penalty(fit.jacobian)
         own = _Part(fit.logs, fit.residual, fit.jacobian / size, fit.kept)
         if not holdout:

@@ -116,9 +116,9 @@ def diagnose_axis(
     base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress = silent
 ) -> AxisDiagnosis:
     """Find what one fitted axis lacks, and what each finding explains."""
-    if any(log.force_noise for log in dataset.fit):  # an effect may explain it yet
+    if any(log.force_noise for log in dataset.training):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
-        base = finished(base.axis, base.begun, dataset.fit, base.outcome)
+        base = finished(base.axis, base.begun, dataset.training, base.outcome)
     searched = search(base, dataset, catalogue, progress)
     progress("what each finding explains", 0, 1)
     found, findings = _proved(_with_ties(searched))
@@ -172,7 +172,7 @@ def _with_own_noise(found: Found) -> Found:
     begun, ended = found.base.fit, Judged(final, noisy)
     if found.final.fit is begun:
         return replace(found, dataset=noisy, base=ended, final=ended)
-    base = finished(begun.axis, begun.begun, noisy.fit, begun.outcome)
+    base = finished(begun.axis, begun.begun, noisy.training, begun.outcome)
     return replace(found, dataset=noisy, base=Judged(base, noisy), final=ended)
 
 
@@ -215,8 +215,8 @@ def _is_level_as(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) ->
     def is_level_by(fit: Fit) -> bool:
         return is_level(replace(rival, judged=Judged(fit, dataset)), own)
 
-    rough = fit_roughly(axis, dataset.fit)  # a better fit is no less level
-    return is_level_by(rough) or is_level_by(fit_axis(rough.axis, dataset.fit))
+    rough = fit_roughly(axis, dataset.training)  # a better fit is no less level
+    return is_level_by(rough) or is_level_by(fit_axis(rough.axis, dataset.training))
 
 
 def _others_alike(step: Step, found: Found) -> list[Tried]:

@@ -149,7 +149,7 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     out = [_finding(steps, found) for steps in by_law]
     dataset, final = found.dataset, found.final
     least = error_in(dataset.chosen_on, final.fit, dataset)
-    left = least / (final.other_floor if dataset.holdout else final.fit.floor)
+    left = least / (final.other_floor if dataset.selection else final.fit.floor)
     return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
 
 
@@ -168,10 +168,10 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
     if len(steps) == len(found.steps):
         return found.base
     dataset = found.dataset
-    fits = [fit_axis(a, dataset.part.fit) for a in (axis, *_alike(axis, found.passed))]
+    fits = [fit_axis(a, dataset.part.training) for a in (axis, *_alike(axis, found.passed))]
     less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
     if dataset.part is not dataset:
-        less = finished(less.axis, less.begun, dataset.fit, less.outcome)
+        less = finished(less.axis, less.begun, dataset.training, less.outcome)
     return Judged(less, dataset)
 
 
@@ -248,7 +248,7 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
         drawn = exponent_curve(without[name], final, dataset)
         return replace(finding, kind=kind, bend=bend, shape=drawn)
     assert isinstance(change, Reshaped)
-    before = less if name in less.axis.names else fit_axis(without, dataset.fit)
+    before = less if name in less.axis.names else fit_axis(without, dataset.training)
     return replace(finding, kind=kind, shape=found_shape(change.shape, before, dataset))
 
 

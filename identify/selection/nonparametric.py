@@ -37,7 +37,7 @@ def fit_nonparametric(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
     Without selection logs it is judged by cross-validation. The curves cover the motion of the fit
     logs only. The evidence counts the effective degrees of freedom.
     """
-    covered = effect.starts(excitation([log.motion for log in dataset.fit], None))
+    covered = effect.starts(excitation([log.motion for log in dataset.training], None))
     empty = Fitted.at_start(effect, covered)
     best = _attempt(base, dataset, empty)
     for _ in range(3):  # of choosing the smoothing again, at most
@@ -67,7 +67,7 @@ def fit_in_place(base: Fit, dataset: Dataset, shape: Shape) -> Fit:
 
 
 def _as_it_is(base: Fit, axis: AxisModel, dataset: Dataset) -> Fit:
-    return finished(axis, base.begun, dataset.fit, base.outcome)
+    return finished(axis, base.begun, dataset.training, base.outcome)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def _attempt(ground: Fit, dataset: Dataset, empty: Fitted) -> _Curve:
     stiffness = choose_stiffness(linear)
     change, freedom = linear.solution(stiffness)
     first = _filled(empty, linear, stiffness, change)
-    fit = fit_axis(ground.axis.with_effect(first), dataset.fit)
+    fit = fit_axis(ground.axis.with_effect(first), dataset.training)
     return _Curve(fit, max(round(freedom - linear.solution({})[1]), 1))
 
 

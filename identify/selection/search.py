@@ -95,7 +95,7 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
     if part is dataset:
         return _search(_begun(base, dataset), catalogue, progress)
     base.forget()  # of all of the logs; it is asked for them when the search has ended
-    begun = replace(fit_axis(base.axis, part.fit), begun=base.begun)
+    begun = replace(fit_axis(base.axis, part.training), begun=base.begun)
     found = _search(_begun(begun, part), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
     _forget(_fits_of(found))
@@ -130,17 +130,17 @@ def _begun(base: Fit, dataset: Dataset) -> Found:
 
 def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     """What was found on the beginnings of logs, fitted to the whole of them."""
-    part, given = found.dataset, dataset.fit
+    part, given = found.dataset, dataset.training
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
     dataset = begun_at(dataset, time_origins(part))
-    same = all(a is b for a, b in zip(given, dataset.fit, strict=True))
+    same = all(a is b for a, b in zip(given, dataset.training, strict=True))
     first = base
     if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
-        first = replace(fit_axis(found.base.fit.axis, dataset.fit), begun=base.begun)
+        first = replace(fit_axis(found.base.fit.axis, dataset.training), begun=base.begun)
     judged = final = Judged(first, dataset)
     if found.steps:
-        fit = fit_axis(found.final.fit.axis, dataset.fit)
+        fit = fit_axis(found.final.fit.axis, dataset.training)
         final = Judged(replace(fit, begun=base.begun), dataset)
     return replace(found, dataset=dataset, base=judged, final=final)
 
@@ -185,7 +185,7 @@ def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> 
     if delay == 0.0 or judged.at_floor:
         return judged
     dataset = realigned(judged.dataset, 0.0)
-    plain = Judged(replace(fit_axis(fit.axis, dataset.fit), begun=fit.begun), dataset)
+    plain = Judged(replace(fit_axis(fit.axis, dataset.training), begun=fit.begun), dataset)
     tried = tried_beside(plain, catalogue, within(progress, "no channel delay"))[1]
     found = [t for t in tried if t.candidate.supported and not t.judged.dataset.channel_delay]
     return plain if any(score(judged, t.judged).accepted for t in found) else judged
@@ -230,7 +230,7 @@ def _on_final_dataset(final: Judged, found: Found) -> Found:
 
     def there(fit: Fit) -> Judged:
         one = Judged(fit, dataset)
-        return one if fit.logs is dataset.fit else refitted_on(fit.axis, one, final)
+        return one if fit.logs is dataset.training else refitted_on(fit.axis, one, final)
 
     first = there(found.base.fit)
 
@@ -339,7 +339,9 @@ def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
 
 def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
     """Whether a fit without a change can make its force all the same, by a free curve."""
-    own = np.concatenate(change.columns(without, fit)[0](without.dataset.fit))[without.fit.kept]
+    own = np.concatenate(change.columns(without, fit)[0](without.dataset.training))[
+        without.fit.kept
+    ]
     return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < RULE.least_fall * np.sum(own**2))
 
 

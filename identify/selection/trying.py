@@ -85,7 +85,7 @@ def tried_beside(
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
     trim_memory()
-    rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.fit])
+    rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.training])
     noise = [as_noise(judged, e) for e in effects if e.is_noise and not rounded]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
     screened = [_as_screened(judged, k) for k in screenings if isinstance(k.change, Added)]
@@ -162,14 +162,14 @@ def settled(judged: Judged) -> Judged:
     moved = moved_by(judged.fit, judged.dataset)
     if moved is None:
         return judged
-    fit = replace(fit_axis(judged.fit.axis, moved.fit), begun=judged.fit.begun)
+    fit = replace(fit_axis(judged.fit.axis, moved.training), begun=judged.fit.begun)
     return Judged(fit, moved) if fit.error < judged.fit.error else judged
 
 
 def refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
     """An axis fitted to the dataset of a judged fit."""
     dataset = judged.dataset
-    return Judged(replace(fit_axis(axis, dataset.fit), begun=begun.fit.begun), dataset)
+    return Judged(replace(fit_axis(axis, dataset.training), begun=begun.fit.begun), dataset)
 
 
 def _as_screened(judged: Judged, screening: Screening) -> Candidate:
@@ -183,7 +183,7 @@ def as_noise(judged: Judged, effect: Effect) -> Tried:
     """An effect that only raises the noise floor."""
     fit, dataset = judged.fit, judged.dataset
     axis = fit.axis.with_effect(starts(fit, dataset, effect)[0].fitted)
-    after = Judged(finished(axis, fit.begun, dataset.fit, fit.outcome), dataset)
+    after = Judged(finished(axis, fit.begun, dataset.training, fit.outcome), dataset)
     change = Added(effect)
     return Tried(change, Screening(change, 0.0), after, noise_candidate(judged, after, effect))
 

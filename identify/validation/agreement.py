@@ -251,4 +251,4 @@ def _along_a_motion(model: MachineModel, axis: str) -> Fit | None:
     except CannotRun:
         return None
     stage = model.axes[axis]
-    return finished(stage, stage, datasets(model, {"": log}, {})[axis].fit, Outcome.CONVERGED)
+    return finished(stage, stage, datasets(model, {"": log}, {})[axis].training, Outcome.CONVERGED)

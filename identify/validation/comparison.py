@@ -98,7 +98,7 @@ def compare_axis(
 
     floor: noise floor, N RMS; as the model and what it leaves tell it where None.
     """
-    axis, logs = model.axes[dataset.axis], dataset.fit
+    axis, logs = model.axes[dataset.axis], dataset.training
     kept = moving(logs, sticks(axis))
     every = residual(axis, logs)
     force = every[kept]

@@ -69,8 +69,8 @@ class Region:
 
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:
     """Where the force error of a fit stands most above its noise floor; None where nowhere."""
-    where = {k: v[fit.kept] for k, v in coordinates(fit.axis, dataset.fit).items()}
-    maps = misfit_maps(fit.axis, dataset.fit, fit.floor, fit.residual, where)
+    where = {k: v[fit.kept] for k, v in coordinates(fit.axis, dataset.training).items()}
+    maps = misfit_maps(fit.axis, dataset.training, fit.floor, fit.residual, where)
     return next(iter(worst_regions(maps, fit.samples)), None)
 
 

@@ -110,7 +110,7 @@ def replay(model: MachineModel | None, log: Log, name: str) -> Replay:
     parts = {}
     for axis, dataset in datasets(model, {name: log}, {}).items():
         own = model.axes[axis]
-        parts[axis] = aligned(own, telling(dataset, sticks(own))).fit[0]
+        parts[axis] = aligned(own, telling(dataset, sticks(own))).training[0]
     return _replay(model, log, name, parts)
 
 

@@ -78,7 +78,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
 def prepared(model: MachineModel, log: Log) -> tuple[PreparedLog, ...]:
     """A record as it is fitted."""
     (dataset,) = datasets(model, {"log": log}, {}, TEST_FUNCTION).values()
-    return dataset.fit
+    return dataset.training
 
 
 def _recovered(known: AxisModel, found: Array) -> dict[str, Numbers]:

@@ -58,7 +58,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     fits = with_elements(axis, dataset, counts)
     tried = compared(fits, test)
     chosen = max(tried, key=lambda e: e["delta_bic"])["elements"]
-    physics, base = fits[chosen], fit_axis(axis.with_effect(first), dataset.fit)
+    physics, base = fits[chosen], fit_axis(axis.with_effect(first), dataset.training)
     beside = {first.effect.name: base}
     for effect in (e for e in CATALOGUE.values() if e.is_nonparametric):
         beside[effect.name] = fit_nonparametric(base, dataset, effect).fit
@@ -70,8 +70,8 @@ def run(small: bool, rng: np.random.Generator) -> Found:
         "elements": {"planted": int(own.values[ELEMENTS]), "found": chosen, "tried": tried},
         "residuals": [
             {"model": name, "parameters_added": more.get(name, 0),
-             "holdout_error": rms(error_on(fit.axis, dataset.holdout)),
-             "test_error": rms(error_on(fit.axis, test.fit))}
+             "holdout_error": rms(error_on(fit.axis, dataset.selection)),
+             "test_error": rms(error_on(fit.axis, test.training))}
             for name, fit in {**beside, own.effect.name: physics}.items()
         ],
         "noise_floor": physics.floor, "unit": "N", "near_zero_speed": slow, "long_run": aged,
@@ -90,7 +90,7 @@ def with_elements(axis: AxisModel, dataset: Dataset, counts: Sequence[int]) -> d
         start = {**effect.starts(dataset.excitation), ELEMENTS: float(count)}
         known = {p.name for p in effect.of_size(count).parameters} if effect.of_size else set()
         own = {k: v for k, v in start.items() if k in known}
-        fits[count] = fit_axis(axis.with_effect(Fitted.at_start(effect, own)), dataset.fit)
+        fits[count] = fit_axis(axis.with_effect(Fitted.at_start(effect, own)), dataset.training)
     return fits
 
 
@@ -122,7 +122,7 @@ def near_zero(small: bool, rng: np.random.Generator) -> Numbers:
         motion = motion_of(logs[label], name, label, ripples=())  # a simulated reading has none
         mapped.append(float(VelocityMap.of(axis, motion).towards(1.0).friction.mean()))
     dataset = datasets(model, logs, {})[name]
-    fit = fit_axis(study.begun(axis, dataset, friction_of(axis).effect), dataset.fit)
+    fit = fit_axis(study.begun(axis, dataset, friction_of(axis).effect), dataset.training)
     planted, fitted = (
         np.array([steady_friction(a, 0.0, v) for v in speeds]) for a in (axis, fit.axis)
     )
@@ -143,7 +143,7 @@ def aging(duration: float, rng: np.random.Generator) -> Numbers:
     whole_run, aged = datasets(machines[0], {"run": logs[0]}, {})[name], axis
     for f in filter(ages, axis.effects):
         aged = study.begun(aged, whole_run, f.effect)
-    whole = fit_axis(aged, whole_run.fit)
+    whole = fit_axis(aged, whole_run.training)
     where = (f"{c.effect}.{c.parameter.name}" for c in whole.scaling.where)
     half = dict(zip(where, half_widths(whole).tolist(), strict=True))
     parameters = {}
@@ -175,7 +175,7 @@ def drift(machine: MachineModel, young: AxisModel, log: Log) -> Numbers:
         part = slice(at, at + size)
         columns = {k: log.axes[name].columns[k][part] for k in ("position", "force")}
         cut = Log(log.sample_rate, {name: AxisLog(columns)})
-        fit = fit_axis(young, datasets(machine, {"part": cut}, {})[name].fit)
+        fit = fit_axis(young, datasets(machine, {"part": cut}, {})[name].training)
         index = [c.parameter.name for c in free_parameters(fit.axis)].index(level.name)
         truth = {k: v[part] for k, v in log.truth[name].items()}
         rows.append((

@@ -93,10 +93,10 @@ def mixture(
     far above the noise floor; true: None where the machine's friction is no mixture. elements: fits
     of numbers of them.
     """
-    alone = [fit_axis(study.begun(axis, dataset, effect), dataset.fit) for effect in PARTS]
+    alone = [fit_axis(study.begun(axis, dataset, effect), dataset.training) for effect in PARTS]
     forgets, remembers = (friction_of(fit.axis).values for fit in alone)
     tried = try_effect(alone[0], dataset, EFFECT).fit
-    begun = fit_axis(axis.with_effect(mixed(remembers, forgets, EQUAL)), dataset.fit)
+    begun = fit_axis(axis.with_effect(mixed(remembers, forgets, EQUAL)), dataset.training)
     both, planted = min(tried, begun, key=lambda fit: fit.error), friction_of(axis)
     where = [(c.effect, c.parameter.name) for c in free_parameters(both.axis)]
     half = half_widths(both)[where.index((EFFECT.name, WEIGHT))] if both.at_floor else np.nan

@@ -97,7 +97,7 @@ def noisy(model: MachineModel, name: str, axis: AxisModel) -> MachineModel:
 def timed(axis: AxisModel, dataset: Dataset) -> tuple[Fit, float]:
     """A fit, and its CPU time, s."""
     start = process_time()
-    fit = fit_axis(axis, dataset.fit)
+    fit = fit_axis(axis, dataset.training)
     return fit, process_time() - start
 
 
@@ -117,10 +117,10 @@ def overall(by_log: Mapping[str, float]) -> float:
 
 def share_right(begun: AxisModel, dataset: Dataset, starts: int, rng: np.random.Generator) -> float:
     """Share of random starts from which the law's own data are fitted to the noise floor."""
-    ended, names = [], [log.motion.name for log in dataset.fit]
+    ended, names = [], [log.motion.name for log in dataset.training]
     for _ in range(starts):
         start = replace(begun, effects=(drawn(begun.effects[0], rng),))
-        ended.append(overall(by_log(fit_axis(start, dataset.fit), names)) <= RIGHT)
+        ended.append(overall(by_log(fit_axis(start, dataset.training), names)) <= RIGHT)
     return float(np.mean(ended))
 
 

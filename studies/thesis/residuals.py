@@ -41,8 +41,8 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     given, test = study.four_logs(machine, 8.0 if small else 20.0, rng, model)
     dataset, base = fit_aligned(model.axes[name], given)
     found = diagnose_axis(base, dataset, Catalogue(study.frictions()) if small else CATALOGUE)
-    before = left_by(base, realigned(test, dataset.channel_delay).fit)
-    after = left_by(found.final, realigned(test, found.dataset.channel_delay).fit)
+    before = left_by(base, realigned(test, dataset.channel_delay).training)
+    after = left_by(found.final, realigned(test, found.dataset.channel_delay).training)
     tests = {"before": before[1], "after": after[1]}
     numbers = {
         "fitted": first.effect.name, "planted": planted.effect.name, "named": found.named,

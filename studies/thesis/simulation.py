@@ -119,7 +119,7 @@ def prepared(model: MachineModel, log: Log) -> tuple[PreparedLog, ...]:
     """The reversals as they are fitted."""
     ((name, own),) = log.axes.items()
     bare = Log(model.sample_rate, {name: AxisLog({"position": own.position, "force": own.force})})
-    return datasets(model, {"reversals": bare}, {}, TEST_FUNCTION)[name].fit
+    return datasets(model, {"reversals": bare}, {}, TEST_FUNCTION)[name].training
 
 
 def static_of(found: VelocityMap) -> Array:

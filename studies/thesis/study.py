@@ -149,4 +149,4 @@ def four_logs(
 
 def over_floor(fit: Fit, test: Dataset) -> float:
     """Error of a fit on another log, over the noise floor."""
-    return rms(error_on(fit.axis, test.fit)) / fit.floor
+    return rms(error_on(fit.axis, test.training)) / fit.floor

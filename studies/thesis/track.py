@@ -130,7 +130,7 @@ def local_fit(model: MachineModel, name: str, logs: Mapping[str, Log], found: Ve
             effects.append(replace(first, fixed=first.fixed | rest))
         elif not any(p.period for p in f.effect.parameters):
             effects.append(replace(f, fixed=frozenset(f.values)))
-    return fit_axis(replace(axis, effects=tuple(effects), mass_fixed=True), dataset.fit)
+    return fit_axis(replace(axis, effects=tuple(effects), mass_fixed=True), dataset.training)
 
 
 def words(n: Numbers) -> list[str]:

@@ -143,7 +143,7 @@ def test_only_what_shows_is_hidden():
     assert found.axes["x"].names == (*model.axes["x"].names, hidden.effect.name)
     log = simulate(found, "tracking", seed=1, duration=3.0, simulator=ReducedSimulator)
     dataset = datasets(found, {"a": log}, {})["x"]
-    without = rms(error_on(found.axes["x"].without(hidden.effect.name), dataset.fit))
+    without = rms(error_on(found.axes["x"].without(hidden.effect.name), dataset.training))
     assert without == pytest.approx(demo.FORCE, rel=0.1)
     with pytest.raises(InputError, match="another seed"):
         demo.hidden_machine(model, Catalogue([some["gms"]]), np.random.default_rng(1))

@@ -53,7 +53,7 @@ def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, fil
     other = twin.simulate(twin.load_model("proton_xy"), "tracking", seed=2, duration=2.0)
     found = [identify.fit("proton_xy", one, other) for one in given[:2]]
     assert found[0].model.axes["x"].mass == pytest.approx(found[1].model.axes["x"].mass, rel=1e-6)
-    assert found[0].datasets["x"].holdout
+    assert found[0].datasets["x"].selection
     names = [list(logs_by_name(one, "training")) for one in given]
     alone, there = "training 1", str(file)
     assert names == [[alone], [there], [there], [alone], [there], ["a"], ["a"]]

@@ -89,7 +89,7 @@ def test_an_addition_tells_the_errors_on_the_logs_of_each_role(found):
         (added.model.axes["x"], step.test_error_after, step.holdout_error_after),
     ):
         assert tested == pytest.approx(rms(error_on(axis, dataset.test)))
-        assert chosen == pytest.approx(rms(error_on(axis, dataset.holdout)))
+        assert chosen == pytest.approx(rms(error_on(axis, dataset.selection)))
         assert abs(tested - chosen) > 0.1 * chosen
     assert [len(dataset.having(role)) for role in Role] == [1, 1, 1]
 
@@ -99,11 +99,11 @@ def test_logs_are_prepared_alike_in_each_role():
     chosen = datasets(STAGE, LOGS, TEST)["x"]
     assert (tested.tested_on, tested.chosen_on) == (Role.TEST, Role.TRAINING)
     assert (chosen.tested_on, chosen.chosen_on) == (Role.SELECTION, Role.SELECTION)
-    (log,), (same,) = tested.test, chosen.holdout
+    (log,), (same,) = tested.test, chosen.selection
     np.testing.assert_array_equal(log.command, same.command)
     assert log.reach == same.reach
     moved = realigned(tested, 2e-4), realigned(chosen, 2e-4)
-    np.testing.assert_array_equal(moved[0].test[0].command, moved[1].holdout[0].command)
+    np.testing.assert_array_equal(moved[0].test[0].command, moved[1].selection[0].command)
     noisy = tested.with_force_noise(0.3)
     assert [log.force_noise for log in noisy.logs] == [0.3, 0.3]
     assert realigned(noisy, 2e-4).force_noise == 0.3
@@ -161,7 +161,7 @@ def test_of_like_verdicts_evidence_or_else_the_error_decides(verdict):
 
 def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_final_model(case):
     x, told, compared = case.x, case.diagnosis.summaries["x"], case.diagnosis.comparison.axes["x"]
-    assert compared.logs is x.dataset.fit
+    assert compared.logs is x.dataset.training
     assert compared.total_error == pytest.approx(x.base.error)
     assert compared.floor == told.floor
     assert told.floor <= x.final.error, "noise is part of what is left"

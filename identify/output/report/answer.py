@@ -70,7 +70,7 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
     """The errors without and with what was found, on the logs of each role."""
     base, final, floor, unit = found.base, found.final, summary.floor, view.units.force
     errors = {f"{Role.TRAINING.value} logs": (base.error, final.error)}
-    if found.dataset.holdout:
+    if found.dataset.selection:
         errors["selection logs"] = (summary.chosen.before, summary.chosen.after)
     elif found.best is not None and len(found.named) == 1:
         errors[tested_on(found).split()[0]] = (found.best.gain.before, found.best.gain.after)

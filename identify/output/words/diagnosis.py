@@ -275,7 +275,7 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
 def _proved(found: AxisDiagnosis) -> str:
     lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
     proof = f"the training logs prove {them}, block by block; there is no selection log"
-    if found.dataset.holdout:
+    if found.dataset.selection:
         proof = f"the training logs and the selection logs prove {them}"
     return f"The model lacks {lacks}: {proof}."
 
@@ -353,7 +353,7 @@ def all_found(found: AxisDiagnosis) -> str:
 
 def tested_on(found: AxisDiagnosis) -> str:
     """What the error is called by which a candidate was judged."""
-    kind = "selection error" if found.dataset.holdout else "cross-validated error"
+    kind = "selection error" if found.dataset.selection else "cross-validated error"
     return f"{kind} of the beginnings, which were searched" if found.in_part else kind
 
 
@@ -432,7 +432,7 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
         *prepared_in_words(found.dataset),
         *_about_the_fits(found, summary),
         found.repeat and repeat_in_words(found.repeat),
-        None if found.dataset.holdout else NO_SELECTION_LOG,
+        None if found.dataset.selection else NO_SELECTION_LOG,
         summary.noise and aliasing_in_words(summary.noise, units),
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]

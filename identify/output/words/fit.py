@@ -213,7 +213,7 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
     """By how much the force channel was corrected, or None."""
     if dataset.channel_delay == 0.0:
         return None
-    samples = dataset.channel_delay / dataset.fit[0].motion.sample_period
+    samples = dataset.channel_delay / dataset.training[0].motion.sample_period
     why = "no drive can do that, so check how force and position are sampled"
     if abs(samples - 0.5) < 0.15:  # samples, within which a shift of half a sample is told as such
         why = "force and position seem to be read at the same instant"

@@ -87,9 +87,9 @@ def test_an_effect_has_the_strength_that_was_asked_beyond_what_the_model_takes_o
     """In noise floors, which are what the machine's own laws leave."""
     found = built("cogging", strength=strength)
     dataset = prepared(found, strength)
-    own = own_error(found.true.axes["x"], dataset.fit)
+    own = own_error(found.true.axes["x"], dataset.training)
     assert found.true.axes["x"].names == ("lugre", "cogging")
-    left = fit_axis(found.model.axes["x"], dataset.fit).error
+    left = fit_axis(found.model.axes["x"], dataset.training).error
     assert np.sqrt(left**2 - own**2) / own == pytest.approx(strength, rel=0.2)
     with pytest.raises(NotShown, match="cogging"):
         prepared(found, 4.0 * strength)
@@ -112,8 +112,8 @@ def test_a_friction_is_planted_first_and_scaled_until_the_model_falls_short():
     assert 0.1 * 0.8 <= level <= 10.0 * 1.2  # of the machine's own, which is drawn
     dataset = prepared(found, 5.0)
     true = found.true.axes["x"]
-    own = own_error(true, dataset.fit)
-    simple = fit_axis(true.with_effect(plain_friction(STAGE, true["gms"].effect)), dataset.fit)
+    own = own_error(true, dataset.training)
+    simple = fit_axis(true.with_effect(plain_friction(STAGE, true["gms"].effect)), dataset.training)
     assert np.sqrt(simple.error**2 - own**2) > 0.5 * 5.0 * own
 
 

@@ -351,7 +351,7 @@ def test_what_resembles_is_right_where_the_machine_has_another_exponent(told, pl
 
 def test_the_truth_lies_so_many_half_widths_from_a_value():
     dataset = built_dataset("run")
-    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    fit = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
     half = dict(zip([c.label for c in fit.scaling.where], half_widths(fit), strict=True))
     assert list(half) == ["mass", "coulomb_viscous.Fc", "coulomb_viscous.sigma2"]
     true = replace(fit.axis, mass=fit.axis.mass + 0.5 * half["mass"])

@@ -341,7 +341,7 @@ def test_a_fit_of_joints_holds_little_beside_their_log_and_its_signals_come_back
     tracemalloc.stop()
     assert held < 2.0 * size  # momentum and bias force are one, signals would be one and a half
     for dataset in found.datasets.values():
-        motion = dataset.fit[0].motion
+        motion = dataset.training[0].motion
         before = {name: getattr(motion, name) for name in SIGNALS}
         motion.forget()
         for name, values in before.items():

@@ -276,7 +276,7 @@ def test_the_beginnings_of_long_logs_are_their_own_beginnings():
     t = np.arange(27_000) / 610.36
     log = log_of(610.36, np.sin(3.0 * t) + 0.3 * np.sin(11.0 * t), -9.0 * np.sin(3.0 * t))
     whole = datasets(PLAIN, {"l": log}, {})["x"]
-    assert len(whole.part.fit[0]) < len(whole.fit[0])
+    assert len(whole.part.training[0]) < len(whole.training[0])
     assert whole.part.part is whole.part
 
 
@@ -398,17 +398,19 @@ def dataset_of(*centres: float) -> Dataset:
 def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     inside, beyond = dataset_of(0.0), dataset_of(0.02)
     assert inside.beyond == {}
-    errors = [rms(error_on(fit_axis(SPRUNG, d.fit).axis, d.holdout)) for d in (inside, beyond)]
+    errors = [
+        rms(error_on(fit_axis(SPRUNG, d.training).axis, d.selection)) for d in (inside, beyond)
+    ]
     assert errors[1] == pytest.approx(errors[0], rel=0.5)  # the step of 0.5 N is not met
     (part,) = beyond.beyond.values()
-    (held,) = beyond.holdout
+    (held,) = beyond.selection
     assert part == pytest.approx(1.0 - np.mean(moving([held], sticks=False)))
     position = held.test_function.mean(held.motion.position)
     assert position[~held.reached].min() > 0.03
     assert 0.2 < part < 0.6
     (told,) = [text for text in prepared_in_words(beyond) if "selection log" in text]
     assert told.startswith(f"held 0: {100 * part:.0f} % of this selection log is left out: it lies")
-    tested = replace(beyond, holdout=(), test=beyond.holdout)
+    tested = replace(beyond, selection=(), test=beyond.selection)
     (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
     assert "of this test log is left out" in told
     assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
@@ -465,10 +467,10 @@ def test_a_log_in_which_readings_are_held_has_the_blocks_of_the_others():
     axis = AxisModel(DRIVEN, effects=(friction, effect("constant_force", {"F0": -BIAS})))
     model = MachineModel("drive", {"x": axis}, 5000.0)
     found = datasets(model, logs, {"lossy": lossy.part(12_000, 16_000)}, 0.1)["x"]
-    (other,) = found.holdout
-    assert other.motion.position_noise > 10.0 * found.fit[0].motion.position_noise
-    assert other.motion.period == found.fit[0].motion.period
-    assert rms(error_on(axis, found.holdout)) < 0.02 * COULOMB
+    (other,) = found.selection
+    assert other.motion.position_noise > 10.0 * found.training[0].motion.position_noise
+    assert other.motion.period == found.training[0].motion.period
+    assert rms(error_on(axis, found.selection)) < 0.02 * COULOMB
 
 
 def test_a_beginning_in_which_a_force_moves_nothing_is_left_out():
@@ -477,11 +479,11 @@ def test_a_beginning_in_which_a_force_moves_nothing_is_left_out():
     found = datasets(FREE_PLAIN, {"hanging": hanging, "free": free}, {})["x"]
     assert list(found.begun) == ["hanging"]
     assert found.begun["hanging"] == pytest.approx(0.5, abs=0.16)
-    assert len(found.fit[0]) < len(found.fit[1])
+    assert len(found.training[0]) < len(found.training[1])
     assert "hanging" in prepared_in_words(found)[0]
     # Its positions are those of the log from there on.
     at = round(found.begun["hanging"] * FREE_RATE)
-    first = found.fit[0].motion.position[0]
+    first = found.training[0].motion.position[0]
     assert first == pytest.approx(hanging.axes["x"].position[at], abs=2e-3)
 
 

@@ -60,14 +60,16 @@ FEW = Catalogue(
 
 def test_it_is_not_named_where_other_noise_is_larger():
     fine = dataset_of(0.0)
-    found = diagnose_axis(fit_axis(STAGE.axes["x"], fine.fit), fine, FEW)
+    found = diagnose_axis(fit_axis(STAGE.axes["x"], fine.training), fine, FEW)
     assert found.verdict is Verdict.NOTHING_MISSING
 
 
 def test_it_is_not_named_for_an_error_it_cannot_make(coarse):
     """The resolution is there, but twice the force error that it could pretend."""
-    louder = tuple(_with_more_force(log) for log in coarse.fit)
-    dataset = replace(coarse, fit=louder, holdout=tuple(map(_with_more_force, coarse.holdout)))
+    louder = tuple(_with_more_force(log) for log in coarse.training)
+    dataset = replace(
+        coarse, training=louder, selection=tuple(map(_with_more_force, coarse.selection))
+    )
     found = diagnose_axis(fit_axis(STAGE.axes["x"], louder), dataset, FEW)
     assert "encoder_quantization" not in found.named
 

@@ -159,7 +159,9 @@ def left(force, held=("held",), seed=8):
         return replace(log, command=log.command - rest + force(log, rng))
 
     data = built_dataset("one", "two", held=held)
-    return replace(data, fit=tuple(map(moved, data.fit)), holdout=tuple(map(moved, data.holdout)))
+    return replace(
+        data, training=tuple(map(moved, data.training)), selection=tuple(map(moved, data.selection))
+    )
 
 
 def noise(log, rng):
@@ -191,7 +193,7 @@ def drift(log, rng):
 
 
 def fit_to(data):
-    return finished(PLAIN, PLAIN, data.fit, Outcome.CONVERGED)
+    return finished(PLAIN, PLAIN, data.training, Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("held", [("held",), ()], ids=["held out", "left out"])
@@ -229,10 +231,10 @@ def test_noise_is_part_of_the_floor_and_said():
 
 def test_one_log_or_one_that_is_larger_where_held_out_does_not_show_noise():
     data = left(noise)
-    alone = replace(data, fit=data.fit[:1], holdout=())
+    alone = replace(data, training=data.training[:1], selection=())
     assert not noise_is_left(fit_to(alone), alone)
-    more = tuple(replace(log, command=2.0 * log.command) for log in data.holdout)
-    assert not noise_is_left(fit_to(data), replace(data, holdout=more))
+    more = tuple(replace(log, command=2.0 * log.command) for log in data.selection)
+    assert not noise_is_left(fit_to(data), replace(data, selection=more))
 
 
 # Laws of clocks: a force channel is moved by as much as it is off, time origins by a line
@@ -258,10 +260,10 @@ def test_a_fit_moves_the_force_by_as_much_as_it_is_off():
     assert found.channel_delay == pytest.approx(1.4e-3, rel=0.02)
     assert fit.axis.mass == pytest.approx(MASS, rel=3e-3)
     assert fit.begun.mass == 1.5
-    np.testing.assert_array_equal(fit.logs[0].command, found.fit[0].command)
+    np.testing.assert_array_equal(fit.logs[0].command, found.training[0].command)
     wanted = realigned(dataset, found.channel_delay)
-    np.testing.assert_allclose(found.fit[0].command, wanted.fit[0].command, atol=0.05)
-    np.testing.assert_allclose(found.holdout[0].command, wanted.holdout[0].command, atol=0.05)
+    np.testing.assert_allclose(found.training[0].command, wanted.training[0].command, atol=0.05)
+    np.testing.assert_allclose(found.selection[0].command, wanted.selection[0].command, atol=0.05)
     still, fit = fit_aligned(axis, dataset_of(aligned(0.0)))
     assert still.channel_delay == 0.0
     assert fit.axis.mass == pytest.approx(MASS, rel=3e-3)
@@ -270,15 +272,19 @@ def test_a_fit_moves_the_force_by_as_much_as_it_is_off():
 def test_a_larger_model_moves_the_force_on_or_back():
     axis = AxisModel(MASS)
     late = dataset_of(aligned(1.4))
-    assert moved_by(fit_of(axis, *late.fit), late).channel_delay == pytest.approx(1.4e-3, rel=0.05)
+    assert moved_by(fit_of(axis, *late.training), late).channel_delay == pytest.approx(
+        1.4e-3, rel=0.05
+    )
     part = realigned(late, 0.6e-3)
-    assert moved_by(fit_of(axis, *part.fit), part).channel_delay == pytest.approx(1.4e-3, rel=0.05)
+    assert moved_by(fit_of(axis, *part.training), part).channel_delay == pytest.approx(
+        1.4e-3, rel=0.05
+    )
     right = dataset_of(aligned(0.0))
-    assert moved_by(fit_of(axis, *right.fit), right) is None
+    assert moved_by(fit_of(axis, *right.training), right) is None
     wrong = realigned(right, 0.9e-3)
-    assert moved_by(fit_of(axis, *wrong.fit), wrong).channel_delay == 0.0
+    assert moved_by(fit_of(axis, *wrong.training), wrong).channel_delay == 0.0
     # back only where that takes a tenth of the square away
-    base = fit_axis(axis, right.fit)
+    base = fit_axis(axis, right.training)
     for part_, told in ((1.05, True), (0.95, False)):
         error = part_ * base.error / np.sqrt(1.0 - RULE.least_fall)
         scaled = replace(base, residual=base.residual * error / base.error)
@@ -348,23 +354,24 @@ def test_a_log_begun_later_has_its_clock_later_modulo_the_period(dataset):
     shifted = np.mod(wanted - 0.25 + 0.5, 1.0) - 0.5
     np.testing.assert_allclose(turns(with_time_origins(ahead, dataset)), shifted, atol=0.01)
     late = (
-        time_origins(with_time_origins(ahead, dataset_of(*dataset.fit, started(0.0211, 3)))) * 23.7
+        time_origins(with_time_origins(ahead, dataset_of(*dataset.training, started(0.0211, 3))))
+        * 23.7
     )
     assert (np.abs(late) <= 0.5).all()  # the nearest of all turns alike
-    assert not time_origins(with_time_origins(axis, dataset_of(dataset.fit[0]))).any()
+    assert not time_origins(with_time_origins(axis, dataset_of(dataset.training[0]))).any()
     near = dataset_of(started(0.0), started(0.015 / 23.7, 1))
     assert not time_origins(with_time_origins(axis, near)).any()  # within two hundredths of a turn
 
 
 def test_the_effects_that_read_the_clock_are_told(dataset):
     axis = STAGE.with_effect(PUMP)
-    assert without_timed_forces(axis, dataset.fit[0]).names == STAGE.names
-    assert without_timed_forces(STAGE, dataset.fit[0]) == STAGE
+    assert without_timed_forces(axis, dataset.training[0]).names == STAGE.names
+    assert without_timed_forces(STAGE, dataset.training[0]) == STAGE
     assert depends_on_time_origin(axis, dataset)
     assert not depends_on_time_origin(STAGE, dataset)
     assert phases_found(axis, "periodic_disturbance", dataset) == 0
     known = with_time_origins(axis, dataset)
-    set_ = sum(log.motion.time_origin != 0.0 for log in known.fit)
+    set_ = sum(log.motion.time_origin != 0.0 for log in known.training)
     assert phases_found(axis, "periodic_disturbance", known) == set_ == 1
     assert phases_found(axis, "coulomb_viscous", known) == 0
 
@@ -389,7 +396,7 @@ def test_a_fit_is_synchronised_unless_it_reads_the_clock(size):
     dataset = dataset_of(*logs)
     found, fit = synchronised(fit_of(AxisModel(1.7), *logs), dataset)
     np.testing.assert_allclose(turns(found), np.arange(4) / (2.0 * np.pi), atol=0.05)
-    assert fit.logs is found.fit
+    assert fit.logs is found.training
     pump = AxisModel(1.7, effects=(effect("periodic_disturbance", {"f": F, "a": 0.01}),))
     own = fit_of(pump, *logs)
     assert synchronised(own, dataset) == (dataset, own)

@@ -392,7 +392,7 @@ def dataset():
 def base(dataset):
     """The axis off its best values, with the residual and Jacobian that it has there."""
     off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
-    return finished(off, PLAIN, dataset.fit, Outcome.CONVERGED)
+    return finished(off, PLAIN, dataset.training, Outcome.CONVERGED)
 
 
 # The search of an effect's shape: which values are tried, and how many of them
@@ -408,7 +408,7 @@ def planted(effect: str, **values: float) -> Dataset:
     motions = [built_motion(name, 7.0, seed) for seed, name in enumerate(("one", "two"))]
     if values:
         motions = [pushed(m, fitted(effect, **values)) for m in motions]
-    return replace(built_dataset(), fit=tuple(PreparedLog.of(m, 0.04) for m in motions))
+    return replace(built_dataset(), training=tuple(PreparedLog.of(m, 0.04) for m in motions))
 
 
 @pytest.mark.parametrize(
@@ -421,7 +421,7 @@ def planted(effect: str, **values: float) -> Dataset:
 )
 def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effect, values):
     dataset, effect = planted(effect, **values), CATALOGUE[effect]
-    base = fit_axis(PLAIN, dataset.fit)
+    base = fit_axis(PLAIN, dataset.training)
     shapes = list(tried_shapes(effect, with_what_repeats(base, dataset)))
     found = starts(base, dataset, effect)
     assert len(found) == min(REFINED_STARTS, len(shapes))
@@ -433,14 +433,14 @@ def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effe
 
 def test_where_nothing_gains_more_than_chance_one_start_is_enough():
     dataset = planted("end_stop")
-    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["end_stop"])
+    found = starts(fit_axis(PLAIN, dataset.training), dataset, CATALOGUE["end_stop"])
     assert len(found) == 1
 
 
 def test_a_wave_longer_than_the_logs_can_show_is_no_start():
     dataset = planted("cogging", p=0.035, a1=0.3)  # m; the travel is 0.1 m
-    base = fit_axis(PLAIN, dataset.fit)
-    position = np.concatenate([log.motion.position for log in dataset.fit])
+    base = fit_axis(PLAIN, dataset.training)
+    position = np.concatenate([log.motion.position for log in dataset.training])
     longest = np.ptp(position) / FEWEST_CYCLES
     seen = with_what_repeats(base, dataset)
     assert any(s["p"] > 2.0 * longest for s in tried_shapes(CATALOGUE["cogging"], seen))
@@ -448,8 +448,8 @@ def test_a_wave_longer_than_the_logs_can_show_is_no_start():
 
 
 def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
-    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
-    tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.fit])
+    base = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
+    tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.training])
     loud = replace(base, residual=tone[base.kept])
     known = replace(dataset, covered=lambda: replace(SEEN, repeats=Repeating((3.21, 4.56))))
     found = with_what_repeats(loud, known)
@@ -467,10 +467,10 @@ def test_a_start_leaves_what_joint_least_squares_leave(dataset, base, name):
     where = [ParameterReference(name, p) for p in found.fitted.effect.strengths]
     axis = base.axis.with_effect(found.fitted)
     stays = [not c.effect or c.effect in axis.without(name).names for c in base.scaling.where]
-    own = jacobian(axis, dataset.fit, where)[base.kept]
+    own = jacobian(axis, dataset.training, where)[base.kept]
     both = np.hstack([own, base.jacobian[:, stays]])
     both = both / np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-    force = residual(axis, dataset.fit)[base.kept]
+    force = residual(axis, dataset.training)[base.kept]
     left = force - both @ np.linalg.lstsq(both, force, rcond=1e-9)[0]
     assert found.squared_error == pytest.approx(float(left @ left), rel=1e-3)
     np.testing.assert_allclose(found.force, force, atol=1e-6 * np.abs(force).max())
@@ -479,8 +479,8 @@ def test_a_start_leaves_what_joint_least_squares_leave(dataset, base, name):
 def test_a_strength_stops_at_its_bound():
     log = PreparedLog.of(pushed(built_motion("one", 3.0, 1), fitted("quadratic_drag", c=5.0)), 0.04)
     log = replace(log, command=log.command - 2.0 * residual(PLAIN, [log]))
-    dataset = replace(built_dataset(), fit=(log,))
-    (found,) = starts(finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED), dataset,
+    dataset = replace(built_dataset(), training=(log,))
+    (found,) = starts(finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED), dataset,
                       CATALOGUE["quadratic_drag"])  # fmt: skip
     assert found.fitted.values["c"] == 0.0
 
@@ -490,7 +490,7 @@ def test_without_an_effect_the_rest_stays_where_it_was(dataset, base):
     assert found.axis == base.axis.without("constant_force")
     assert (found.begun, found.outcome) == (base.begun, base.outcome)
     np.testing.assert_allclose(
-        found.residual, residual(base.axis, dataset.fit)[found.kept] - 0.2, atol=1e-9
+        found.residual, residual(base.axis, dataset.training)[found.kept] - 0.2, atol=1e-9
     )
 
 
@@ -507,10 +507,10 @@ def test_a_stop_that_only_a_late_move_reaches_is_the_first_start():
     stopped = pushed(motion, fitted("end_stop", low=low, high=high, stiffness=2000.0))
     covered = replace(SEEN, position_low=float(x.min()), position_high=float(x.max()))
     dataset = replace(
-        built_dataset(), fit=(PreparedLog.of(stopped, 0.04),), covered=lambda: covered
+        built_dataset(), training=(PreparedLog.of(stopped, 0.04),), covered=lambda: covered
     )
     (head,) = dataset.heads
-    found = starts(fit_axis(PLAIN, dataset.fit), dataset, CATALOGUE["end_stop"])
+    found = starts(fit_axis(PLAIN, dataset.training), dataset, CATALOGUE["end_stop"])
     first = found[0].shape
     assert first["low"] < head.motion.position.min()
     assert first["high"] > head.motion.position.max()
@@ -524,7 +524,7 @@ def test_a_shape_is_sought_anew_where_error_is_left_and_nowhere_else():
     right = replace(right, fixed=right.fixed | {"b1"})
     dataset = built_machine(built_dataset("one", "two"), axis_of(right))
     begun = axis_of(replace(right, values={**right.values, "p": 0.031, "a1": 0.01}))
-    stuck, found = fit_axis(begun, dataset.fit), fit_multistart(begun, dataset)
+    stuck, found = fit_axis(begun, dataset.training), fit_multistart(begun, dataset)
     assert found.error < 0.1 * stuck.error
     values = found.axis["cogging"].values
     assert (values["p"], values["a1"]) == pytest.approx((0.02, 0.4), rel=0.01)

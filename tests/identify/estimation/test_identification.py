@@ -48,9 +48,9 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     there = STAGE.with_axis("x", AXIS.with_effect(Fitted.at_start(effect, stops)))
     log = tracked(there, 3, 10.0)
     dataset = datasets(STAGE, {"log": log}, {})["x"]
-    touching = float(dataset.fit[0].motion.position.min()) + 1e-4
+    touching = float(dataset.training[0].motion.position.min()) + 1e-4
     begun = AXIS.with_effect(Fitted.at_start(effect, {**stops, "low": touching}))
-    fit = finished(begun, begun, dataset.fit, Outcome.CONVERGED)
+    fit = finished(begun, begun, dataset.training, Outcome.CONVERGED)
     found = {e.label: e for e in estimates(fit)}
     assert found["end_stop.low"].low is None
     assert found["end_stop.low"].reason == OpenSided(Side.SMALLER)

@@ -72,7 +72,7 @@ def begun(length: float, force: float, rubs: bool = True) -> tuple[Fit, Dataset]
     model = MachineModel("stage", {"x": axis, "y": axis}, RATE)
     log = log_of(RATE, length * x, force * command, length * y)
     dataset = datasets(model, {"log": log}, {})["x"]
-    return fit_axis(axis, dataset.fit), dataset
+    return fit_axis(axis, dataset.training), dataset
 
 
 def of_friction(effect: Effect) -> bool:
@@ -85,7 +85,7 @@ def of_friction(effect: Effect) -> bool:
 def fitted_in(effect: Effect, length: float, force: float) -> Fit:
     base, dataset = begun(length, force, of_friction(effect))
     start = starts(base, dataset, effect)[0]
-    return fit_axis(base.axis.with_effect(start.fitted), dataset.fit)
+    return fit_axis(base.axis.with_effect(start.fitted), dataset.training)
 
 
 def differing(effect: Effect, length: float, force: float) -> list[str]:

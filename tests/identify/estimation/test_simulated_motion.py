@@ -52,7 +52,7 @@ def log(slide) -> Log:
 
 
 def prepared(model: MachineModel, log: Log) -> tuple[PreparedLog, ...]:
-    return datasets(model, {"log": log}, {}, 0.1)["x"].fit
+    return datasets(model, {"log": log}, {}, 0.1)["x"].training
 
 
 def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:

@@ -204,7 +204,7 @@ def dataset():
 
 
 def test_only_effects_without_a_shape_can_be_a_parameter_by_another_name(dataset):
-    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    fit = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
     names = ("payload_mass", "axis_coupling", "cogging", "lugre", "coulomb_viscous")
     found = linear_bases(fit, Catalogue([CATALOGUE[n] for n in names]))
     assert {n: b.shape[1] for n, b in found.items()} == {"axis_coupling": 2, "payload_mass": 1}
@@ -231,8 +231,8 @@ def test_an_effect_or_a_model_is_an_explanation(monkeypatch, dataset):
 
 def test_an_effect_without_data_is_ten_floors_strong(monkeypatch, dataset):
     found = explanations._supposed(CATALOGUE["constant_force"], PLAIN, dataset)
-    floor = explanations.floor_of(PLAIN, dataset.fit)
-    added = residual(found, dataset.fit) - residual(PLAIN, dataset.fit)
+    floor = explanations.floor_of(PLAIN, dataset.training)
+    added = residual(found, dataset.training) - residual(PLAIN, dataset.training)
     assert rms(added) == pytest.approx(10.0 * floor, rel=1e-6)
 
 

@@ -127,7 +127,7 @@ def y_first() -> Diagnosis:
 
 def undecided() -> Diagnosis:
     """One effect without selection logs, and an experiment that is too short."""
-    dataset = replace(made.DATASET, holdout=())
+    dataset = replace(made.DATASET, selection=())
     found = made.diagnosed(made.diagnosis_of(findings=(ONE,), dataset=dataset, on=Role.TRAINING))
     plan = made.plan_of("a", "b", ranking=(replace(made.TRIALS[0], gain=1.0),))
     return replace(found, next_experiments={"x": plan})

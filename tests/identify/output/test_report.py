@@ -237,7 +237,7 @@ def test_no_error_of_the_growth_is_below_the_floor_of_its_logs(case: Case) -> No
 def test_curves_are_those_of_the_final_model(case: Case) -> None:
     x, drag = case.x, load_catalogue()["quadratic_drag"]
     final = x.final.axis.with_effect(Fitted.at_start(drag, {"c": 2.0}))
-    fit = finished(final, x.base.axis, x.dataset.fit, Outcome.CONVERGED)
+    fit = finished(final, x.base.axis, x.dataset.training, Outcome.CONVERGED)
     both = (*x.findings, replace(x.findings[0], effect=drag.name))
     subject = case.subject(case.concluding(replace(x, final=fit, findings=both)))
     (signals,) = explored(subject)

@@ -51,7 +51,7 @@ def curve_fit():
 
 COGGING, LUGRE = made.FOUND
 ALONE = replace(COGGING, tied=())
-TRAINED = replace(made.DATASET, channel_delay=0.0, holdout=())
+TRAINED = replace(made.DATASET, channel_delay=0.0, selection=())
 SHAPE = FoundShape(
     Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N",
     {"forwards": Drawn(np.array([1.0, 1.5]), np.array([1.2, 2.9]), np.array([0.31, 0.43]))},
@@ -74,7 +74,7 @@ def pair():
 def with_test_logs():
     """With test logs, which contradict one finding."""
     against = replace(ALONE, tested=made.errors(2.17, 2.29, Role.TEST)[0])
-    dataset = replace(made.DATASET, test=made.DATASET.holdout)
+    dataset = replace(made.DATASET, test=made.DATASET.selection)
     return of(made.diagnosis_of(on=Role.TEST, dataset=dataset, findings=(against, LUGRE)))
 
 

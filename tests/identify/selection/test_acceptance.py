@@ -272,8 +272,8 @@ def planted(effect: Effect, size: float = SIZE) -> Planted:
     """With the effect's own force at the middle one of its start shapes."""
     base = axis_for(effect)
     honest = built_machine(logs(), base)
-    fit = fit_axis(base, honest.fit)
-    places = np.concatenate([log.motion.position for log in honest.fit])
+    fit = fit_axis(base, honest.training)
+    places = np.concatenate([log.motion.position for log in honest.training])
     seen = replace(SEEN, position_low=float(places.min()), position_high=float(places.max()))
     shapes = list(tried_shapes(effect, seen))
     axis = fit.axis.with_effect(Fitted.at_start(effect, shapes[len(shapes) // 2]))
@@ -282,7 +282,7 @@ def planted(effect: Effect, size: float = SIZE) -> Planted:
     def columns(logs: Sequence[PreparedLog]) -> list[np.ndarray]:
         return split_by_log(jacobian(axis, logs, where), logs)
 
-    own = np.concatenate(columns(honest.fit))[fit.kept]
+    own = np.concatenate(columns(honest.training))[fit.kept]
     sizes = np.linalg.norm(own, axis=0)
     assert sizes.any(), "its columns are nothing on these logs"
     strengths = np.random.default_rng(3).uniform(0.5, 1.0, len(where)) / np.maximum(sizes, 1e-12)
@@ -293,8 +293,8 @@ def planted(effect: Effect, size: float = SIZE) -> Planted:
         pairs = zip(logs, columns(logs), strict=True)
         return tuple(replace(log, command=log.command - c @ strengths) for log, c in pairs)
 
-    dataset = replace(honest, fit=having(honest.fit), holdout=having(honest.holdout))
-    judged = Judged(fit_axis(base, dataset.fit), dataset)
+    dataset = replace(honest, training=having(honest.training), selection=having(honest.selection))
+    judged = Judged(fit_axis(base, dataset.training), dataset)
     return Planted(judged, with_unit_penalty(columns, judged.fit), sticks(axis))
 
 
@@ -318,9 +318,9 @@ def test_of_noise_an_effect_takes_next_to_nothing(effect: Effect) -> None:
 
 def test_a_selection_log_of_fewer_test_functions_than_blocks_has_controls() -> None:
     found = planted(CATALOGUE["cogging"])
-    (log,) = found.judged.dataset.holdout
+    (log,) = found.judged.dataset.selection
     short = PreparedLog.of(log.motion.head(0.2), 0.04)
-    judged = replace(found.judged, dataset=replace(found.judged.dataset, holdout=(short,)))
+    judged = replace(found.judged, dataset=replace(found.judged.dataset, selection=(short,)))
     assert len(short) < 24
     assert np.isfinite(replace(found, judged=judged).control)
 
@@ -331,7 +331,7 @@ def test_a_planted_friction_passes_beside_another_by_what_it_changes(effect: Eff
     other = STICKY if effect.name == "coulomb_viscous" else FRICTION
     true, base = (replace(AXES[0], effects=(f,)) for f in (Fitted.at_start(effect), other))
     dataset = built_machine(logs(), true)
-    before, after = (Judged(fit_axis(axis, dataset.fit), dataset) for axis in (base, true))
+    before, after = (Judged(fit_axis(axis, dataset.training), dataset) for axis in (base, true))
     found = score(before, after, change_control(before, after))
     assert found.part > 0.95
     assert found.accepted
@@ -346,7 +346,7 @@ DRAWN = built_dataset("run 1", "run 2", held=("held 1",))
 
 def test_an_effect_that_is_there_is_proved_and_one_that_is_not_is_refused() -> None:
     machine = built_machine(DRAWN, axis_of(fitted("cogging", p=0.02, a1=0.4)))
-    base = fit_axis(axis_of(), machine.fit)
+    base = fit_axis(axis_of(), machine.training)
     there = try_effect(base, machine, CATALOGUE["cogging"])
     assert (there.supported, there.refused) == (True, None)
     assert there.part > 0.9
@@ -364,7 +364,7 @@ def test_a_law_of_another_shape_is_given_the_one_that_the_logs_show() -> None:
 
     machine = built_machine(DRAWN, axis_of(), bumps)
     smooth = axis_of(fitted("cogging", p=0.02, a1=0.4))
-    fit = fit_axis(smooth, machine.fit)
+    fit = fit_axis(smooth, machine.training)
     found, change = reshape(CATALOGUE["cogging"], {"x": fit}, {"x": machine})
     assert change.name == "cogging"
     assert found.fit.error < 0.7 * fit.error

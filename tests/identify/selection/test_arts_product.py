@@ -97,8 +97,8 @@ def test_a_friction_that_yields_is_named_and_explains_what_it_can(model, logs, t
     assert added.kept
     dataset = answer.dataset
     start = np.array([np.log(1e4), np.log(2e6), 0.0, 0.0])
-    own = least_squares(lambda p: own_dahl(dataset.fit, p), start, x_scale=[1, 1, 1e3, 1e2]).x
-    reference = np.sqrt(np.mean(own_dahl(dataset.holdout, own) ** 2))
+    own = least_squares(lambda p: own_dahl(dataset.training, p), start, x_scale=[1, 1, 1e3, 1e2]).x
+    reference = np.sqrt(np.mean(own_dahl(dataset.selection, own) ** 2))
     assert added.step.holdout_error_after < 1.05 * reference
     assert (
         error_in(Role.SELECTION, answer.base, dataset) > 4.0 * reference

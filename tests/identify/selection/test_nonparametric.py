@@ -281,7 +281,7 @@ def test_the_part_that_helps_most_comes_first_and_is_tuned_again():
 def about():
     """A description about a fit of a built motion."""
     dataset = built_dataset("run")
-    base = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    base = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
     empty = Fitted.at_start(MAP_EFFECT)
     return base, dataset, empty, Linearised.about(base, dataset, empty)
 
@@ -295,7 +295,7 @@ def test_the_columns_are_physics_then_the_description(about):
     np.testing.assert_array_equal(found.columns[:, :k], base.jacobian)
     alone = replace(PLAIN, effects=(empty,))
     np.testing.assert_array_equal(
-        found.columns[:, k:], jacobian(alone, dataset.fit, own)[base.kept]
+        found.columns[:, k:], jacobian(alone, dataset.training, own)[base.kept]
     )
     ridge = (RIDGE * np.linalg.norm(base.jacobian, axis=0)) ** 2
     np.testing.assert_allclose(np.diag(found.physics)[:k], ridge)
@@ -329,7 +329,7 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
 @pytest.mark.parametrize("held", [("held",), ()])
 def test_curves_count_as_many_parameters_as_they_are_worth(held):
     dataset = built_machine(built_dataset("run", held=held), PLAIN, lambda x, turn: 40.0 * x**2)
-    made = fit_nonparametric(fit_axis(PLAIN, dataset.fit), dataset, MAP_EFFECT)
+    made = fit_nonparametric(fit_axis(PLAIN, dataset.training), dataset, MAP_EFFECT)
     assert 1 < made.evidence.parameters < 0.3 * len(MAP_EFFECT.strengths)
     assert made.evidence.samples == effective_samples(made.fit.residual)
     assert made.part > 0.9

@@ -229,13 +229,13 @@ def test_a_curve_of_friction_is_offered_where_both_directions_are_well_visited(
     ride = Ride(1, reach=0.05, fast=0.02 if back > 1.0 else 0.3, back=back)
     logs = {str(i): logged(true, replace(ride, seed=i)) for i in (1, 2)}
     fit, dataset = begun(SLIDE, logs, {})
-    speed = np.concatenate([p.test_function.mean(p.motion.velocity) for p in dataset.fit])
+    speed = np.concatenate([p.test_function.mean(p.motion.velocity) for p in dataset.training])
     behind = float(np.mean(speed[fit.kept] < 0.0))
     assert behind > 0.4 if offered else behind < 0.07
     shapes = shapes_of(fit, dataset)
     assert [s.effect for s in shapes] == ["coulomb_viscous"] * offered
     for shape in shapes:  # drawn where the logs have been, and nowhere else
-        places = np.concatenate([log.motion.position for log in dataset.fit])
+        places = np.concatenate([log.motion.position for log in dataset.training])
         drawn = found_shape(shape, fit, dataset).coordinate
         assert (drawn[0], drawn[-1]) == (places.min(), places.max())
 

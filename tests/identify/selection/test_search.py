@@ -198,7 +198,7 @@ def test_a_law_of_any_machine_is_found_with_its_values(name: str) -> None:
     true = MachineModel("m", {"x": axis.with_effect(Fitted.at_start(effect, values))}, 2000.0)
     log = tracked(true, 3, 6.0)
     dataset = datasets(true.with_axis("x", axis), {"log": log}, {})["x"]
-    base = fit_axis(axis, dataset.fit)
+    base = fit_axis(axis, dataset.training)
     assert effect in absent_effects(axis, CATALOGUE)
     found = try_effect(base, dataset, effect)
     assert found.supported

@@ -164,15 +164,15 @@ def test_a_comparison_gathers_what_the_residual_says():
 
 def test_it_is_where_the_force_is_that_the_model_lacks() -> None:
     place, dataset = 0.015, built_dataset("one", "two")
-    fit = finished(PLAIN, PLAIN, dataset.fit, Outcome.CONVERGED)
+    fit = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
     assert worst_region(fit, dataset) is None
 
     def bumped(log):
         bump = np.exp(-(((log.motion.position - place) / 0.002) ** 2))
         return replace(log, command=log.command + log.test_function.mean(0.5 * bump))
 
-    there = replace(dataset, fit=tuple(map(bumped, dataset.fit)))
-    region = worst_region(finished(PLAIN, PLAIN, there.fit, Outcome.CONVERGED), there)
+    there = replace(dataset, training=tuple(map(bumped, dataset.training)))
+    region = worst_region(finished(PLAIN, PLAIN, there.training, Outcome.CONVERGED), there)
     assert region is not None
     assert (region.coordinate, region.unit) == ("position", "m")
     assert abs(0.5 * (region.low + region.high) - place) < 0.004
@@ -280,8 +280,10 @@ def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
     def tested(stage):
         result = fit(stage, logs)
         found, dataset = result.fits["x"], result.datasets["x"]
-        force = residual(found.axis, dataset.fit)
-        return residual_tests(dataset.fit, force, found.kept, found.floor, loop_of(dataset.fit))
+        force = residual(found.axis, dataset.training)
+        return residual_tests(
+            dataset.training, force, found.kept, found.floor, loop_of(dataset.training)
+        )
 
     found = tested(STAGE)
     assert found.passes

@@ -124,11 +124,11 @@ def planted(effect: Effect, axis: AxisModel, dataset: Dataset, seed: int) -> Fit
     """Drawn values with which it acts along this motion; None where it does not."""
     rng, size = np.random.default_rng(seed), SEEN
     if effect.kind is Kind.FRICTION:  # as strong as the one whose place it takes
-        size = rms(residual(bare(axis), dataset.fit) - residual(axis, dataset.fit))
+        size = rms(residual(bare(axis), dataset.training) - residual(axis, dataset.training))
         axis = bare(axis)
     for _ in range(DRAWS):
-        drawn = draw_effect(effect, axis, dataset.fit, dataset.excitation, size, rng)
-        acts = added_force(drawn, axis, dataset.fit, residual(axis, dataset.fit))
+        drawn = draw_effect(effect, axis, dataset.training, dataset.excitation, size, rng)
+        acts = added_force(drawn, axis, dataset.training, residual(axis, dataset.training))
         if rms(acts) > 0.5 * size and _rises(drawn, axis, dataset):
             return drawn
     return None
@@ -137,7 +137,7 @@ def planted(effect: Effect, axis: AxisModel, dataset: Dataset, seed: int) -> Fit
 def _rises(drawn: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
     """Whether an encoder with that effect reads more the farther the axis is, as any does."""
     part = parts_of(axis.with_effect(drawn), Kind.SENSING)
-    motion = dataset.fit[0].motion
+    motion = dataset.training[0].motion
     if not part.effects or drawn.effect.is_noise:
         return True
     _, rate = reading_error(part, motion)
@@ -161,7 +161,7 @@ def attempts(effect: Effect, seed: int) -> Iterator[Recovered]:
         dataset = setting.dataset(model.with_axis("x", truth), seed)
         own = effect.name == setting.friction
         without = bare(model.axes["x"]) if own else model.axes["x"]
-        base = fit_axis(without, dataset.fit)
+        base = fit_axis(without, dataset.training)
         yield Recovered(truth, base, try_effect(base, dataset, effect))
 
 

@@ -218,7 +218,7 @@ def test_a_machine_with_several_other_axes_refuses_an_effect_of_the_other_one() 
 
 
 def test_each_other_axis_has_its_own_name_in_the_residual(gone_round: Round) -> None:
-    log = datasets(gone_round.model, gone_round.logs, {})[gone_round.axis].fit[0]
+    log = datasets(gone_round.model, gone_round.logs, {})[gone_round.axis].training[0]
     where = coordinates_of(log)
     assert not [name for name in where if name.startswith("other_axis")]
     named = {name for name in where if name.startswith("axis_")}
@@ -315,7 +315,7 @@ def test_a_stage_mounts_on_slides_and_hinges_of_its_own() -> None:
     for axis in "xc":
         gone = log.truth[axis]["position"] - reduced.truth[axis]["position"]
         assert np.abs(gone).max() < ROUNDING
-    motion = datasets(mixed, {"run": log}, {})["x"].fit[0].motion
+    motion = datasets(mixed, {"run": log}, {})["x"].training[0].motion
     assert unit_of("other_axis_velocity", motion) == "rad/s"
     assert unit_of("velocity", motion) == "m/s"
 
