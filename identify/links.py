@@ -55,7 +55,7 @@ INERTIAL = {
 class WrongBody:
     """A body whose inertial parameters are not those of the file.
 
-    body: its name; axis: that moves it. level: names of others that explain as much. axes: whose
+    body: its name; axis: that moves it. tied: names of others that explain as much. axes: whose
     forces it changes.
     inertial, change, band (10,): each of INERTIAL as the file has it, by how much it is more, and
     half the 90 % band of that; no number where the logs do not tell it. score: over all joints.
@@ -64,7 +64,7 @@ class WrongBody:
 
     body: str
     axis: str
-    level: tuple[str, ...]
+    tied: tuple[str, ...]
     axes: tuple[str, ...]
     inertial: Array
     change: Array
@@ -189,7 +189,7 @@ def _accepted(
     if not score.accepted:
         return None
 
-    def is_level(rival: _Body) -> bool:
+    def is_tied(rival: _Body) -> bool:
         other = _training(trial.after(rival, trial.change(rival)), before)
         gain = taken(other, _training(after, before), 1.0)
         return gain.t < least_t(1) or gain.part < RULE.least_part
@@ -199,7 +199,7 @@ def _accepted(
     return WrongBody(
         body=body.name,
         axis=body.mechanism.axes[body.index],
-        level=tuple(r.name for r in rivals if is_level(r)),
+        tied=tuple(r.name for r in rivals if is_tied(r)),
         axes=tuple(axis for axis in body.axes if axis in fits),
         inertial=body.mechanism.inertial(body.index),
         change=change,

@@ -1,4 +1,4 @@
-"""The thresholds of every decision, in one place and each with its reason.
+"""The thresholds that decisions share, in one place and each with its reason.
 
 Errors are RMS forces, parts are of the squared error above the noise floor, 0..1.
 """

@@ -15,7 +15,7 @@ from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Screening, control
 from identify.selection.findings import Finding, FindingKind, findings_of, without_law
-from identify.selection.search import Found, Step, is_level, search
+from identify.selection.search import Found, Step, is_tied, search
 from identify.selection.trying import Tried
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -191,7 +191,7 @@ def _compared_again(step: Step, found: Found) -> Step:
     final, names = found.final, {s.change.name for s in found.steps}
     axis = step.change.undone(final.fit.axis, found.base.fit.axis)
     if axis is None:
-        return replace(step, level=())
+        return replace(step, tied=())
     own = replace(step.tried, judged=final)
 
     def beside(rival: Tried) -> bool:
@@ -203,20 +203,20 @@ def _compared_again(step: Step, found: Found) -> Step:
         laws = [law] if rival.candidate.score else []
         if law.effect.kind in ALIKE:  # whose values were those of another model
             laws.append(_as_free_as(final.fit.axis[step.change.name], law))
-        return any(_is_level_as(axis.with_effect(each), rival, own, found.dataset) for each in laws)
+        return any(_is_tied_with(axis.with_effect(each), rival, own, found.dataset) for each in laws)
 
-    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.level)}
-    return replace(step, level=tuple(t for t in rivals.values() if beside(t)))
+    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
+    return replace(step, tied=tuple(t for t in rivals.values() if beside(t)))
 
 
-def _is_level_as(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) -> bool:
+def _is_tied_with(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) -> bool:
     """Whether a rival is level with what was found, as this axis begins its fit."""
 
-    def is_level_by(fit: Fit) -> bool:
-        return is_level(replace(rival, judged=Judged(fit, dataset)), own)
+    def is_tied_by(fit: Fit) -> bool:
+        return is_tied(replace(rival, judged=Judged(fit, dataset)), own)
 
     rough = fit_roughly(axis, dataset.training)  # a better fit is no less level
-    return is_level_by(rough) or is_level_by(fit_axis(rough.axis, dataset.training))
+    return is_tied_by(rough) or is_tied_by(fit_axis(rough.axis, dataset.training))
 
 
 def _others_alike(step: Step, found: Found) -> list[Tried]:

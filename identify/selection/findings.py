@@ -203,7 +203,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     axis = next(fit.axis for fit in fits if name in fit.axis.names)
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
-    tied = (t.change.name for s in steps for t in s.level)
+    tied = (t.change.name for s in steps for t in s.tied)
     finding = Finding(
         effect=name,
         tied=tuple(dict.fromkeys(other for other in tied if other != name)),

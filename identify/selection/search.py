@@ -1,6 +1,6 @@
 """The search for what a model lacks: one list of changes a round, one acceptance test.
 
-Forward: of all changes that are accepted, the one that leaves least; of those that are level with
+Forward: of all changes that are accepted, the one that leaves least; of those tied with
 it, the one with the fewest parameters. Backward: an earlier change that is not accepted beside the
 later ones goes. Where no change is accepted alone, those that come nearest are followed one round
 further: two that are accepted together, and each beside the other, are needed together.
@@ -48,7 +48,7 @@ from twin.threads import trim_memory
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A change that was accepted, and those that are level with it.
+    """A change that was accepted, and those tied with it.
 
     with_others: whether it is accepted only together with another step. held: whether a later free
     curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
@@ -56,7 +56,7 @@ class Step:
     """
 
     tried: Tried
-    level: tuple[Tried, ...] = ()
+    tied: tuple[Tried, ...] = ()
     with_others: bool = False
     held: bool = False
     dropped: tuple[str, ...] = ()
@@ -108,7 +108,7 @@ def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress
 
 def _fits_of(found: Found) -> list[Fit]:
     """All fits of a search, some of them several times."""
-    tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.level))]
+    tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.tied))]
     fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
     return [*fits, *(c.fit for c in found.ranking)]
 
@@ -251,7 +251,7 @@ def _on_final_dataset(final: Judged, found: Found) -> Found:
     return replace(found, base=first, ranking=tuple(ranking.values()), steps=steps, passed=passed)
 
 
-def is_level(one: Tried, best: Tried) -> bool:
+def is_tied(one: Tried, best: Tried) -> bool:
     """Whether the logs do not clearly prefer the better of two changes."""
     effects = [t.change.effect for t in (one, best) if isinstance(t.change, Added)]
     if len(effects) == 2 and all(e.dead_time for e in effects):
@@ -260,7 +260,7 @@ def is_level(one: Tried, best: Tried) -> bool:
 
 
 def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
-    """The step that the search takes: the simplest of those level with the best."""
+    """The step that the search takes: the simplest of those tied with the best."""
     proved = [t for t in tried if t.candidate.supported]
     lowering = [t for t in proved if not t.candidate.is_noise]
     noise = [t for t in proved if t.candidate.is_noise]
@@ -272,7 +272,7 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     if isinstance(best.change, Reshaped):
         lowering = _laws_for(best, judged, tried) or lowering
         best = _best_of(lowering)
-    level = [t for t in lowering if t is not best and is_level(t, best)]
+    level = [t for t in lowering if t is not best and is_tied(t, best)]
     first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
 
@@ -281,7 +281,7 @@ def _best_of(tried: Sequence[Tried]) -> Tried:
     """The change that takes most, or the one that the logs clearly prefer to it."""
     best, *others = sorted(tried, key=lambda t: -t.candidate.part)
     for one in others:
-        best = best if is_level(best, one) else one
+        best = best if is_tied(best, one) else one
     return best
 
 

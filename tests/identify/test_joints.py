@@ -419,7 +419,7 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     found = diagnose(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
     body = found.body
     assert body is not None
-    assert (body.body, body.level, body.axes) == ("fore", (), JOINTS)
+    assert (body.body, body.tied, body.axes) == ("fore", (), JOINTS)
     assert body.told["mass"][0] == pytest.approx(0.5, rel=0.01)
     assert body.told["first moment x"][0] == pytest.approx(0.15, rel=0.01)
     assert body.told["inertia yy"][0] == pytest.approx(0.045, rel=0.02)

@@ -371,7 +371,7 @@ class BodyEntry(Entry):
     """A body of a mechanism whose inertia is not that of its file."""
 
     body: str
-    ambiguous_with: list[str] = read("level")
+    ambiguous_with: list[str] = read("tied")
     axes: list[str]
     """Whose forces it changes."""
     confidence: Number

@@ -40,7 +40,7 @@ def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> AnswerBlock:
         for a, e in body.errors.items()
         if a in body.axes
     ]
-    headline = f"Body {' or '.join((body.body, *body.level))}: another inertia"
+    headline = f"Body {' or '.join((body.body, *body.tied))}: another inertia"
     return AnswerBlock(headline, sentence, tiles, others, Tone.STRONG)
 
 

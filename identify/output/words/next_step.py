@@ -279,7 +279,7 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
 
 def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     """That a body is not as its file has it, by how much, and the errors without and with it."""
-    file, name = model.mjcf_name, " or ".join((found.body, *found.level))
+    file, name = model.mjcf_name, " or ".join((found.body, *found.tied))
     score = found.score
     more = (f"{part} {with_band(*told, INERTIAL[part])}" for part, told in found.told.items())
     said = [

@@ -48,7 +48,7 @@ def test_of_level_changes_the_one_with_fewest_parameters_is_named_and_the_others
     assert found.answers == (("constant_force", "spring"),)
     assert found.ambiguous_with == ("spring",)
     (step,) = found.steps
-    own, (rival,) = step.tried.judged, step.level
+    own, (rival,) = step.tried.judged, step.tied
     assert own.parameters < rival.judged.parameters
 
 
