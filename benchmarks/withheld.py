@@ -310,9 +310,7 @@ def _with_body(result: Diagnosis, axis: str) -> AxisDiagnosis:
     if body is None:
         return found
     errors, unit = body.errors[axis], found.dataset.units.force
-    finding = Finding(
-        "link_mass", body.tied, body.score.part, errors, errors, unit, {}, body.score
-    )
+    finding = Finding("link_mass", body.tied, body.score.part, errors, errors, unit, {}, body.score)
     return replace(found, findings=(finding, *found.findings))
 
 

@@ -1,9 +1,9 @@
 """The noise floor of a fit with its parts and its uncertainty: one for all that is told of it.
 
-Between the changes of a reading the axis goes by a smooth path through them, so that much of what
-rounding to an encoder's steps did is told (`identify.dataset.readings`). That a reading changed is
-known to a sample only. This hides noise as white as the rounding of a fast motion, a twelfth of the
-squared step, but less by the part of the samples at which the reading changes.
+A smooth path through the instants at which a reading changes restores most of what rounding to an
+encoder's steps took away (`identify.dataset.readings`). These instants are known to one sample
+only. What remains unknown is white noise, as of the rounding of a fast motion: a twelfth of the
+squared step, times the part of the samples at which the reading changes.
 
 Over the position, rounding is a sawtooth. At a speed v its k-th harmonic, which has 6/(pi k)^2 of
 its power, is a tone of k v/step, folded at the sample rate: a motion of even speed has its rounding
@@ -71,11 +71,11 @@ def noise_beside(
 ) -> NoiseFloor:
     """The noise floor of these logs, or less where what is left leaves no room for it.
 
-    left: of each log (n,) N, what the axis leaves, zero where it tells nothing. Noise leaves no
-    less than itself, so that the floor is at most its RMS. One that is below all that the floor may
-    be refutes the noise of the force: it was the controller's answer to readings that the log does
-    not hold, or a load that strikes within its play. Its level is then what the residual leaves
-    room for, and how large it could be is that of the logs.
+    left: of each log (n,) N, what the axis leaves, zero where it says nothing. A fit never leaves
+    less than the noise, so the floor is at most the RMS of it. Where it is below the whole range of
+    the floor, the force noise was estimated too high: it was the controller's answer to readings
+    that the log does not hold, or impacts within a play. It is then reduced to what the spectrum of
+    the residual allows; the upper end of the range stays.
     """
     noises = noises_of(axis, [log.motion for log in logs])
     floor = _of_parts(axis, logs, noises)
@@ -97,7 +97,7 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     return noise_beside(axis, logs).value
 
 
-def noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
+def white_noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
     """RMS in N of what white noise leaves in the force residual, that of rounding at speed too."""
     motions = [motion for motion, _ in logs]
     noises = noises_of(axis, motions)

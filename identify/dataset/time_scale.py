@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.dataset.motion import Motion
-from identify.dataset.noise_floor import noise_floor
+from identify.dataset.noise_floor import white_noise_floor
 from identify.dataset.test_function import LEAST_BLOCKS, LOOK, TestFunction
 from twin.model.machine import INERTIA, MASS, AxisModel
 from twin.signals import Array
@@ -55,7 +55,7 @@ class AtLength:
         gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
         left = forces - columns.T @ gains
         mass = max(float(gains[0]), _least_mass(motions))
-        floor = noise_floor(AxisModel(mass), list(zip(motions, test_functions, strict=True)))
+        floor = white_noise_floor(AxisModel(mass), list(zip(motions, test_functions, strict=True)))
         return cls(length, float(np.sqrt(np.mean(left**2))), floor)
 
 
@@ -95,7 +95,7 @@ def choose_test_function(motions: Motions, others: Motions = (), *, imposed: boo
         test_functions = [TestFunction.of_length(length, m.period) for m in motions]
         pairs = list(zip(motions, test_functions, strict=True))
         rest = np.concatenate([w.mean(m.net) - mass * w.acceleration(m.velocity) for m, w in pairs])
-        if noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
+        if white_noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
             return length
     return max(TEST_FUNCTIONS[-1], LEAST_BLOCKS * longest_block)
 

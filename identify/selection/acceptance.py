@@ -5,10 +5,10 @@ another, a free curve, an exponent, two effects together. Three numbers are comp
 thresholds (``RULE``):
 
 * part: of what the smaller model leaves of the squared force error above the noise floor, the part
-  that the larger one takes. Of all of it or of that of a typical block (geometric mean),
-  whichever is more, as a few blocks may hold most of an error; on the training logs or on logs
-  that were not fitted, whichever is less, as either alone can be imitated. Nothing is taken
-  typically by what makes the whole error rise.
+  that the larger one takes. It is computed of the whole error and of a typical block (geometric
+  mean), and the larger counts, as a few blocks may hold most of an error; where the whole error
+  rises, the whole counts. It is computed on the training logs and on logs that were not fitted,
+  and the smaller counts, as either alone can be imitated.
 * t: the logarithmic gain over blocks over its standard error; on the training logs less what as
   many parameters take of noise. Each group of logs has to show it by itself, and the more changes
   were tried, the more is asked of both together (Bonferroni, Stouffer).
@@ -196,9 +196,10 @@ def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -
 def prefers(one: Judged, other: Judged) -> bool:
     """Whether the logs clearly prefer one model to another, where both explain them.
 
-    Logs for which the two predict the same force, or nearly, say nothing of it: at the noise
-    floor, where they differ by less than noise lets tell. All others have to agree; and where more
-    than noise is left, which one of the two may take by chance, on a difference that matters.
+    Logs on which the two predict nearly the same force do not vote; at the noise floor these are
+    the ones on which they differ by less than noise allows to see. All that vote must agree. Above
+    the floor the better one must also take a part that matters, as what is left may be taken by
+    chance.
     """
     by = score(other, one)
     groups = (by.training, by.other)

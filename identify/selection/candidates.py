@@ -122,8 +122,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     A value that ended at a bound belongs to another law, whatever the bound's sign; a strength at
     zero is no bound but absence. What repeats along the track has to be seen a few times. An effect
     that takes the place of the inertia explains nothing: in a motion that repeats in time a sine in
-    time can hold its force. Without the effect, as a motor's saturation, the base may have found a
-    mass that is none.
+    time can hold its force. The mass of the base may be wrong for want of this effect, such as a
+    saturation, so it is compared with both the fitted mass and the one that was begun with.
     """
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):

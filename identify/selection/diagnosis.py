@@ -203,7 +203,9 @@ def _compared_again(step: Step, found: Found) -> Step:
         laws = [law] if rival.candidate.score else []
         if law.effect.kind in ALIKE:  # whose values were those of another model
             laws.append(_as_free_as(final.fit.axis[step.change.name], law))
-        return any(_is_tied_with(axis.with_effect(each), rival, own, found.dataset) for each in laws)
+        return any(
+            _is_tied_with(axis.with_effect(each), rival, own, found.dataset) for each in laws
+        )
 
     rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
     return replace(step, tied=tuple(t for t in rivals.values() if beside(t)))

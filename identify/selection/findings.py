@@ -7,8 +7,9 @@ logs and on others: the part of what was left that the finding takes, and t, how
 over blocks. What takes nearly all of it was nearly always right, on own machines, on those of
 another simulator and on real drives with a term withheld; what takes a third may stand for
 something that is not in the catalogue. A gain that hardly differs from chance was that of a wrong
-name half of the time, above all where a larger effect was found before it. What is left beside it,
-how clearly it beats its controls and how many rivals it has told no more.
+name half of the time, above all where a larger effect was found before it. Three other
+figures did not make the prediction better: what is left beside it, how clearly it beats its
+controls, and how many rivals it has.
 """
 
 from __future__ import annotations

@@ -286,11 +286,11 @@ def _best_of(tried: Sequence[Tried]) -> Tried:
 
 
 def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
-    """The laws that take about as much as a free curve, whose ten numbers are any law's.
+    """The laws that take about as much as a free curve, which are preferred to it.
 
     It has shown that something is missing, so none of them has to be the best of many by itself.
     """
-    # 0.66 of the part of a free curve, whose ten numbers are any law's: it goes first
+    # A curve of ten numbers can imitate any law: one that reaches two thirds of it is preferred.
     least = 0.66 * curve.candidate.part
     laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
     alone = (

@@ -17,7 +17,7 @@ from identify import workflow
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Blocks, motion_of
 from identify.dataset.noise import noise_of, noises_of
-from identify.dataset.noise_floor import floor_of, noise_beside, noise_floor, rounding_in
+from identify.dataset.noise_floor import floor_of, noise_beside, rounding_in, white_noise_floor
 from identify.dataset.prepared_log import PreparedLog, moving, on_blocks, sticks, total_force
 from identify.dataset.readings import white_rounding
 from identify.dataset.spectrum import fitted_levels, median_spectrum
@@ -316,7 +316,7 @@ def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_le
     wanted = (own[0] * parts[0] + own[1] * parts[1]) / sum(parts)
     assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=1e-9)
     pairs = [(log.motion, log.test_function) for log in logs]
-    assert noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
+    assert white_noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
 
 
 def test_the_shortest_window_that_is_quiet_is_chosen():
