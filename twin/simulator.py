@@ -347,7 +347,7 @@ def _culprit(forces: Array, model: MachineModel, table: Table, axis: str) -> str
         return (
             f"axis {axis}: effect {effect} gives {forces[bad[0]]:.3g} "
             f"{model.axes[axis].units.force}; change its values (or its law, if it is yours), or "
-            "raise sample_rate (Hz)"
+            f"raise sample_rate (Hz){_without_rotor(model, axis)}"
         )
     own = [i for i, label in enumerate(table.labels) if label[0] == axis]
     named = ""
@@ -356,8 +356,19 @@ def _culprit(forces: Array, model: MachineModel, table: Table, axis: str) -> str
         named = f" (its largest force is that of {table.labels[largest][1]})"
     return (
         f"axis {axis}{named}; lower the bandwidth (Hz) or the damping parameters, or raise "
-        "sample_rate (Hz)"
+        f"sample_rate (Hz){_without_rotor(model, axis)}"
     )
+
+
+def _without_rotor(model: MachineModel, axis: str) -> str:
+    """The hint for a joint whose inertia is that of its link alone; empty for others."""
+    own = model.axes[axis]
+    attributes = [
+        f.effect.joint_attributes(f.values) for f in own.effects if f.effect.joint_attributes
+    ]
+    if not own.joint or any("armature" in given for given in attributes):
+        return ""
+    return "; the joint lacks the inertia of its motor (armature)"
 
 
 def _bad(values: Array) -> NDArray[np.bool_]:

@@ -201,6 +201,7 @@ def test_a_model_that_runs_away_is_compared_by_its_torques_alone(folder, caplog)
     assert not found.position_error
     assert found.force_error
     assert "2.mcap: the simulation became unstable" in caplog.text
+    assert caplog.text.rstrip().endswith("lacks the inertia of its motor (armature)")
     prepared = datasets(model, {"2.mcap": read_log(folder / "2.mcap")}, {})
     assert errors_of_both(model, wild, "elbow", prepared) == (None, None)  # of an effect added
 
