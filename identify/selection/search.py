@@ -273,8 +273,21 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         lowering = _laws_for(best, judged, tried) or lowering
         best = _best_of(lowering)
     level = [t for t in lowering if t is not best and is_tied(t, best)]
-    first = min((best, *level), key=lambda t: (round(t.judged.parameters), -t.candidate.part))
+    first = _simplest((best, *level))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
+
+
+def _simplest(tied: Sequence[Tried]) -> Tried:
+    """Of tied changes the one with the fewest parameters, unless logs that were not fitted ask.
+
+    Few parameters are to predict other logs well, and the selection logs tell whether they do.
+    """
+    first, *others = sorted(tied, key=lambda t: (round(t.judged.parameters), -t.candidate.part))
+    for one in others:
+        by = score(first.judged, one.judged)
+        clear = by.other.t >= least_t(1) and by.other.part >= RULE.least_part
+        first = one if clear and by.training.t > -least_t(1) else first
+    return first
 
 
 def _best_of(tried: Sequence[Tried]) -> Tried:
