@@ -1,7 +1,7 @@
 """The search for what a model lacks: one list of changes a round, one acceptance test.
 
-Forward: of all changes that are accepted, the one that leaves least; of those tied with
-it, the one with the fewest parameters. Backward: an earlier change that is not accepted beside the
+Forward: of all changes that are accepted, the one that leaves least; of those tied with it, the one
+with the fewest parameters, unless the selection logs ask for another. Backward: an earlier change that is not accepted beside the
 later ones goes. Where no change is accepted alone, those that come nearest are followed one round
 further: two that are accepted together, and each beside the other, are needed together.
 """
