@@ -1,9 +1,10 @@
 """The search for what a model lacks: one list of changes a round, one acceptance test.
 
 Forward: of all changes that are accepted, the one that leaves least; of those tied with it, the one
-with the fewest parameters, unless the selection logs ask for another. Backward: an earlier change that is not accepted beside the
-later ones goes. Where no change is accepted alone, those that come nearest are followed one round
-further: two that are accepted together, and each beside the other, are needed together.
+with the fewest parameters, unless the selection logs ask for another. Backward: an earlier change
+that is not accepted beside the later ones goes. Where no change is accepted alone, those that come
+nearest are followed one round further: two that are accepted together, and each beside the other,
+are needed together.
 """
 
 from __future__ import annotations
@@ -273,11 +274,11 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         lowering = _laws_for(best, judged, tried) or lowering
         best = _best_of(lowering)
     level = [t for t in lowering if t is not best and is_tied(t, best)]
-    first = _simplest((best, *level))
+    first = simplest((best, *level))
     return [Step(first, tuple(t for t in (best, *level) if t is not first))]
 
 
-def _simplest(tied: Sequence[Tried]) -> Tried:
+def simplest(tied: Sequence[Tried]) -> Tried:
     """Of tied changes the one with the fewest parameters, unless logs that were not fitted ask.
 
     Few parameters are to predict other logs well, and the selection logs tell whether they do.

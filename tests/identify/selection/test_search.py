@@ -7,6 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from built_fits import built, built_fit, tried
 from machines import CATALOGUE, PROTON, tracked
 from planted_logs import SLIDE, Ride, asked, few, having
 
@@ -16,7 +17,7 @@ from identify.estimation.fit import fit_axis
 from identify.estimation.variable_projection import absent_effects
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import FindingKind
-from identify.selection.search import Step
+from identify.selection.search import Step, simplest
 from identify.selection.trying import try_effect
 from twin import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
@@ -50,6 +51,28 @@ def test_of_level_changes_the_one_with_fewest_parameters_is_named_and_the_others
     (step,) = found.steps
     own, (rival,) = step.tried.judged, step.tied
     assert own.parameters < rival.judged.parameters
+
+
+@pytest.mark.parametrize(
+    ("fitted", "held", "named"),
+    [
+        (1.0, 1.0, "gravity"),  # the logs do not tell them apart
+        (1.0, 0.5, "cogging"),  # the logs that were not fitted ask for the larger one
+        (2.0, 0.5, "gravity"),  # but those that were fitted refuse it
+    ],
+)
+def test_selection_logs_may_ask_for_the_larger_of_tied_changes(fitted, held, named) -> None:
+    """Errors of cogging over those of gravity, which has fewer parameters, on logs of a role."""
+    noise = 10.0 * np.random.default_rng(8).standard_normal(2400)
+
+    def change(name: str, parameters: float, fitted: float, held: float):
+        made = tried(built(name, fit=built_fit(1.0, residual=fitted * noise)))
+        own = {"other": held * noise, "other_floor": 1.0, "parameters": parameters}
+        made.judged.__dict__.update(own)
+        return made
+
+    few, many = change("gravity", 6.0, 1.0, 1.0), change("cogging", 9.0, fitted, held)
+    assert simplest((many, few)).change.name == named
 
 
 def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
