@@ -1,6 +1,7 @@
 """What travels inside the package, and what the architecture forbids."""
 
 import ast
+import importlib
 import json
 import re
 import shutil
@@ -37,6 +38,16 @@ def test_packages_import_only_downwards():
     assert importing("twin", "identify", "studies", "benchmarks", "tests") == []
     assert importing("identify", "studies", "benchmarks", "tests") == []
     assert importing("identify", "twin") != []
+
+
+def test_every_public_name_is_there():
+    """Of each package that says what it offers."""
+    offering = [p for top in ("twin", "identify") for p in (ROOT / top).rglob("__init__.py")
+                if "__all__ = " in p.read_text(encoding="utf-8")]  # fmt: skip
+    assert len(offering) > 3
+    for path in offering:
+        package = importlib.import_module(".".join(path.parent.relative_to(ROOT).parts))
+        assert not [name for name in package.__all__ if not hasattr(package, name)], path
 
 
 def test_studies_stay_outside_and_use_public_names_alone():

@@ -107,7 +107,8 @@ def tables_of(machines: Sequence[Machine]) -> str:
     answers = [a for m in machines for a in m.answers]
     lines = []
     for name, figure in FIGURES.items():
-        steps = ", ".join(f"Level({v.least:.2f}, {v.right:.2f})" for v in levels(answers, figure))
+        bins = levels(answers, figure)
+        steps = ", ".join(f"ConfidenceBin({v.least:.2f}, {v.right:.2f})" for v in bins)
         lines.append(f"{name} = ({steps})  # {len(answers)} answers")
     return "\n".join(lines)
 

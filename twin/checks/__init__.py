@@ -19,7 +19,7 @@ from twin.checks.content import (
 from twin.checks.report import CheckReport, Fault, LogFinding, Severity
 from twin.logs.log import Log
 
-__all__ = ["CheckReport", "Fault", "Finding", "Severity", "check_assumed", "check_log", "moves"]
+__all__ = ["CheckReport", "Fault", "LogFinding", "Severity", "check_assumed", "check_log", "moves"]
 
 PARTS = (
     check_units, check_timing, check_breaks, check_command, check_outliers, check_saturation,
