@@ -159,6 +159,15 @@ def harmonics(position, period):
     return sin1, cos1, sin2, cos2, sin2 * cos1 + cos2 * sin1, cos2 * cos1 - sin2 * sin1
 
 
+def ripple(p, position):
+    """Two harmonics of the period p[0], m, with the strengths p[1] to p[4]."""
+    sine, cosine, sine2, cosine2, _, _ = harmonics(position, p[0])
+    return p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
+
+
+RIPPLE_CYCLES = 70  # most over the travel of a ripple, that are tried before a model tells them
+
+
 def columns_of(io, waves):
     """Write these waves as the columns of the strengths, in their order."""
     io[COLUMNS] = len(waves)

@@ -8,14 +8,13 @@ of a phase error is left out, a shift of zero.
 """
 
 from twin.effect import LEAST, MOST, READING, Effect, Kind, Parameter
-from twin.law_parts import columns_of, harmonic_terms, harmonics
+from twin.law_parts import columns_of, harmonic_terms, harmonics, ripple
 
 SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
 
 def law(p, s, io):
-    sine, cosine, sine2, cosine2, _, _ = harmonics(io[READING], p[0])
-    io[READING] += p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
+    io[READING] += ripple(p, io[READING])
 
 
 def columns(p, s, io):

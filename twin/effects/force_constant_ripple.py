@@ -7,15 +7,17 @@ magnet motors", Proc. American Control Conference 2001.
 """
 
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U, X
-from twin.law_parts import harmonic_terms, harmonics, of_shortest_pitch, pitches_to_try
-
-CYCLES = 70  # most over the travel that are tried before a model tells them
+from twin.law_parts import (
+    RIPPLE_CYCLES,
+    harmonic_terms,
+    of_shortest_pitch,
+    pitches_to_try,
+    ripple,
+)
 
 
 def law(p, s, io):
-    sine, cosine, sine2, cosine2, _, _ = harmonics(io[X], p[0])
-    ripple = p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
-    io[U] += io[U] * ripple
+    io[U] += io[U] * ripple(p, io[X])
 
 
 EFFECT = Effect(
@@ -26,7 +28,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "p", "m", 0.024, LEAST, MOST, "magnet pitch", period=True,
-            scan=lambda e: pitches_to_try(e.thrust_pitches, e.travel, 2, CYCLES),
+            scan=lambda e: pitches_to_try(e.thrust_pitches, e.travel, 2, RIPPLE_CYCLES),
         ),
         *harmonic_terms(2, "1", 0.5),
     ),

@@ -6,15 +6,17 @@ M. Walther, A. Verl, "Periodic variation of preloading in ball screws", Prod. En
 """
 
 from twin.effect import DRY, LEAST, MOST, Effect, Kind, Parameter, X
-from twin.law_parts import harmonic_terms, harmonics, of_shortest_pitch, pitches_to_try
-
-CYCLES = 70  # most over the travel that are tried before a model tells them
+from twin.law_parts import (
+    RIPPLE_CYCLES,
+    harmonic_terms,
+    of_shortest_pitch,
+    pitches_to_try,
+    ripple,
+)
 
 
 def law(p, s, io):
-    sine, cosine, sine2, cosine2, _, _ = harmonics(io[X], p[0])
-    ripple = p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
-    io[DRY] *= max(1.0 + ripple, 0.01)  # friction cannot turn negative
+    io[DRY] *= max(1.0 + ripple(p, io[X]), 0.01)  # friction cannot turn negative
 
 
 EFFECT = Effect(
@@ -25,7 +27,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "p", "m", 0.02, LEAST, MOST, "travel of one turn of the part that rubs", period=True,
-            scan=lambda e: pitches_to_try(e.friction_pitches, e.travel, 2, CYCLES),
+            scan=lambda e: pitches_to_try(e.friction_pitches, e.travel, 2, RIPPLE_CYCLES),
         ),
         *harmonic_terms(2, "1", 0.5),
     ),
