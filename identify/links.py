@@ -75,13 +75,13 @@ class WrongBody:
     fits: Mapping[str, Fit]
 
     @property
-    def told(self) -> dict[str, tuple[float, float]]:
+    def differing(self) -> dict[str, tuple[float, float]]:
         """Parameters that differ from the file by more than their band: change and band."""
         each = zip(INERTIAL, self.change.tolist(), self.band.tolist(), strict=True)
         return {name: (value, band) for name, value, band in each if band < abs(value)}
 
     @property
-    def untold(self) -> tuple[str, ...]:
+    def undetermined(self) -> tuple[str, ...]:
         """Parameters that these joints do not tell, or only together with others."""
         return tuple(n for n, band in zip(INERTIAL, self.band, strict=True) if np.isnan(band))
 

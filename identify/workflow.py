@@ -65,7 +65,6 @@ from twin.mujoco.written import inertial
 from twin.parallel import Progress, parallel, silent, within
 from twin.threads import trim_memory
 
-Logs = Mapping[str, Log]
 Model = MachineModel | str | Path
 READING = "reading and preparing the logs"
 
@@ -173,7 +172,7 @@ def _given(
     holdout: GivenLogs | None = None,
     test: GivenLogs | None = None,
     catalogue: Catalogue | None = None,
-) -> tuple[MachineModel, Logs, Logs, Logs]:
+) -> tuple[MachineModel, Mapping[str, Log], Mapping[str, Log], Mapping[str, Log]]:
     """A model and the logs of each role by name, of whatever the caller has. Raises InputError."""
     roles = (Role.TRAINING, logs), (Role.SELECTION, holdout), (Role.TEST, test)
     training, selection, tests = (logs_by_name(given, role.value) for role, given in roles)
@@ -391,9 +390,9 @@ def add_shape(
     effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
-    if axis is not None:
-        require_moving(axis, before.fits)
     fits = {n: before.fits[n] for n in names if n in before.fits}
+    if not fits:
+        require_moving(names[0], before.fits)
     progress("adding", 0, 1)
     best, shape = reshape(effect, fits, before.datasets)
     return _with_notes(addition(best, fits[best.axis], before.datasets, before.model, model, shape))

@@ -77,9 +77,7 @@ class Dataset:
 
     def having(self, role: Role) -> tuple[PreparedLog, ...]:
         """The logs of a role."""
-        return {Role.TRAINING: self.training, Role.SELECTION: self.selection, Role.TEST: self.test}[
-            role
-        ]
+        return dict(zip(Role, (self.training, self.selection, self.test), strict=True))[role]
 
     def with_logs(self, logs: Iterable[PreparedLog]) -> Dataset:
         """The same with other logs in the place of ``logs``, in that order."""

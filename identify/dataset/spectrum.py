@@ -153,8 +153,7 @@ def find_lines(
     """Lines from ``lowest`` to ``highest`` (cycles per unit), the least likely by chance first.
 
     chance: highest false-alarm probability of those returned, ``most`` in number; that of the rule
-    where None. Of n samples the
-    highest is n cycles over their span at most.
+    where None. Of n samples the highest is n cycles over their span at most.
     """
     chance = RULE.chance if chance is None else chance
     records = [r for r in records if len(r.values) > 3 and r.span > 0.0 and np.ptp(r.values) > 0.0]

@@ -71,9 +71,8 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     fit. Where the dataset has a channel delay already, the result is the change of it; the delay as
     a whole is never negative.
     """
-    rate = np.concatenate([w.fine.acceleration(w.motion.raw[1]) for w in dataset.training])[
-        fit.kept
-    ]
+    rates = [log.fine.acceleration(log.motion.raw[1]) for log in dataset.training]
+    rate = np.concatenate(rates)[fit.kept]
     left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
     power = float(own @ own)
     if power <= ROUNDING * float(rate @ rate):
@@ -81,9 +80,8 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     shift = -float(own @ left) / power
     after = left + shift * own
     fallen = rms(after) < RULE.fallen * rms(left)
-    samples = (dataset.channel_delay + shift) / max(
-        w.motion.sample_period for w in dataset.training
-    )
+    longest = max(log.motion.sample_period for log in dataset.training)
+    samples = (dataset.channel_delay + shift) / longest
     possible = RULE.least_shift < samples < RULE.most_shift
     told = possible and fallen and evidence(left, after, 1).delta_bic > RULE.least_bic
     return shift if told else 0.0

@@ -152,10 +152,8 @@ class Remainder:
 def is_noise(fit: Fit, dataset: Dataset) -> bool:
     """Whether what a fit leaves is noise, so that its size is a part of the noise floor."""
     gaussian, laplace = 3.0, 6.0  # kurtosis of these noises
-    logs = (
-        *dataset.training,
-        *dataset.selection,
-    )  # one does not tell: where it is once predicts nothing
+    # One log does not tell: where it is once predicts nothing.
+    logs = (*dataset.training, *dataset.selection)
     command = np.concatenate([log.command for log in fit.logs])[fit.kept]
     # 0.5 of the force, RMS: a larger rest is of another machine
     if len(logs) == 1 or fit.error > 0.5 * rms(command):

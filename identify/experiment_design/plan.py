@@ -252,8 +252,8 @@ def _rivals(found: AxisDiagnosis) -> list[Candidate]:
         s for s in reversed(found.steps)
         if isinstance(s.change, Added) and s.change.name == found.named[0]
     )  # fmt: skip
-    level = {t.change.name: t.candidate for t in step.tied}
-    others = [level[name] for name in found.ambiguous_with if name in level]
+    tied = {t.change.name: t.candidate for t in step.tied}
+    others = [tied[name] for name in found.ambiguous_with if name in tied]
     most_rivals = 3  # explanations that a diagnosis asks one experiment to separate
     return [step.tried.candidate, *others][:most_rivals]
 

@@ -145,9 +145,8 @@ def hidden_part(fitted: Fitted, base: Fit, dataset: Dataset) -> float:
 
 
 def _beside(fitted: Fitted, base: Fit, dataset: Dataset) -> Array:
-    return added_force(fitted, base.axis, dataset.training, residual(base.axis, dataset.training))[
-        base.kept
-    ]
+    logs = dataset.training
+    return added_force(fitted, base.axis, logs, residual(base.axis, logs))[base.kept]
 
 
 def added_force(

@@ -264,7 +264,7 @@ class Addition(Printed):
         return self.step.effect if self.step.action == "shape" else None
 
     @property
-    def told_on(self) -> Role:
+    def reported_on(self) -> Role:
         """The logs that tell most of it: those of the errors that were decided on least."""
         if self.step.test_error_after is not None:
             return Role.TEST

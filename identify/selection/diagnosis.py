@@ -244,15 +244,15 @@ def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
 
 def _small(found: Found) -> tuple[str, ...]:
     """Effects that the data show beside what was found, each too small to matter."""
-    least_t, least_part = 3.0, 0.02  # from which a change is real, and worth a word
+    if found.final.at_floor:
+        return ()
+    seen = (3.0, 0.02)  # t and part from which a change is real, and worth a word, though too small
+    added = [t for t in found.last if isinstance(t.change, Added) and not t.candidate.doubt]
     return tuple(
         t.change.name
-        for t in found.last
-        if not found.final.at_floor
-        and isinstance(t.change, Added)
-        and (s := t.candidate.score)
-        and s.t > least_t
-        and least_part < s.part < RULE.least_part
-        and not t.candidate.doubt
+        for t in added
+        if (s := t.candidate.score)
+        and s.t > seen[0]
+        and seen[1] < s.part < RULE.least_part
         and s.part > control(t.change, found.final, t.judged)
     )

@@ -273,9 +273,9 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     if isinstance(best.change, Reshaped):
         lowering = _laws_for(best, judged, tried) or lowering
         best = _best_of(lowering)
-    level = [t for t in lowering if t is not best and is_tied(t, best)]
-    first = simplest((best, *level))
-    return [Step(first, tuple(t for t in (best, *level) if t is not first))]
+    tied = [best, *(t for t in lowering if t is not best and is_tied(t, best))]
+    first = simplest(tied)
+    return [Step(first, tuple(t for t in tied if t is not first))]
 
 
 def simplest(tied: Sequence[Tried]) -> Tried:

@@ -27,7 +27,7 @@ from identify.output.report.page import Block
 from studies.drawing import BLUE
 from studies.telling import Line, Panel, picture, table
 from studies.thesis import study
-from studies.thesis.behaviours import LEG, LOOP, RATE, behaviours, traits, turning
+from studies.thesis.behaviours import LEG, LOOP, RATE, behaviours, characteristics, turning
 from studies.thesis.study import Array, Found, Numbers, friction_of
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -57,7 +57,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     for effect, (law, machine) in zip(effects, machines.items(), strict=True):
         stage = noisy(model, name, machine)
         logs = behaviours(stage, rng)
-        numbers["traits"][law] = traits(stage, logs, rng)
+        numbers["traits"][law] = characteristics(stage, logs, rng)
         dataset = datasets(stage, logs, {}, TEST_FUNCTION)[name]
         fits = {e.name: timed(study.begun(machine, dataset, e), dataset) for e in effects}
         spent.append([took for _, took in fits.values()])

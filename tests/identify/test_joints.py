@@ -421,9 +421,9 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     body = found.body
     assert body is not None
     assert (body.body, body.tied, body.axes) == ("fore", (), JOINTS)
-    assert body.told["mass"][0] == pytest.approx(0.5, rel=0.01)
-    assert body.told["first moment x"][0] == pytest.approx(0.15, rel=0.01)
-    assert body.told["inertia yy"][0] == pytest.approx(0.045, rel=0.02)
+    assert body.differing["mass"][0] == pytest.approx(0.5, rel=0.01)
+    assert body.differing["first moment x"][0] == pytest.approx(0.15, rel=0.01)
+    assert body.differing["inertia yy"][0] == pytest.approx(0.045, rel=0.02)
     assert not any(d.findings for d in found.axes.values())
     assert all(e.after < 0.05 * e.before for e in body.errors.values())
     told = text_of(found)
@@ -486,8 +486,8 @@ def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(
     assert told.motor == motor
     assert (told.body and told.body.body) == body
     if told.body:  # a column along its own joint and what turns with it
-        assert told.body.untold == ("mass", "first moment y")
-        assert told.body.told["first moment x"][0] == pytest.approx(0.12, rel=0.01)
+        assert told.body.undetermined == ("mass", "first moment y")
+        assert told.body.differing["first moment x"][0] == pytest.approx(0.12, rel=0.01)
     if motor:
         known = Catalogue([*FEW.values(), load_catalogue()["torque_constant"]])
         offered = told.offered(known, motor)

@@ -152,8 +152,9 @@ EXPERIMENTS: Mapping[str, Named] = {
     "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration)),
     "moves": Named(
         Moves.summary,
+        # a move every 0.1 s or so
         lambda model, axis, duration: Moves(max(int(duration / 0.1), 2), duration=duration),
-    ),  # s between moves
+    ),
     "cable_pass": Named("one axis back and forth at 0.1 m/s over the travel", _cable_pass),
     "velocity_map": Named(Staircase.summary, _velocity_map),
     "reversals": Named(

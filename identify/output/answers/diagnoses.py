@@ -380,7 +380,7 @@ class BodyEntry(Entry):
     control: Number = read("score.control")
     parameters: dict[str, InertialEntry]
     """That differ from the file by more than their band."""
-    not_told: list[str] = read("untold")
+    not_told: list[str] = read("undetermined")
     """By these joints, or only together with others."""
     errors: dict[str, ErrorsEntry]
 
@@ -423,7 +423,7 @@ def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:
     """Its parameters and errors, with their units."""
     told = {
         name: InertialEntry(more=value, band_90=band, unit=INERTIAL[name])
-        for name, (value, band) in found.told.items()
+        for name, (value, band) in found.differing.items()
     }
     errors = {
         axis: ErrorsEntry.of(own, unit=model.axes[axis].units.force)

@@ -81,10 +81,8 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
         Tile(view.words(f"Force error, {on}"), _fall(*pair, unit), remark)
         for on, pair in errors.items()
     ]
-    ratio, noise = (
-        _fall(base.error / floor, final.error / floor, "1"),
-        DisplayUnit.of(unit, base.error),
-    )
+    ratio = _fall(base.error / floor, final.error / floor, "1")
+    noise = DisplayUnit.of(unit, base.error)
     of = f"training logs; floor {noise.text(floor)} RMS"
     tiles.append(Tile("Error over noise floor", ratio, of))
     return [*tiles, *_position_tile(view, f", without {view.label}" if view.label else "")]

@@ -246,7 +246,7 @@ def notes_in_words(made: Addition) -> tuple[tuple[str, ...], tuple[str, ...]]:
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"
         )
-    chose = also_chose_in_words(made.told_on)
+    chose = also_chose_in_words(made.reported_on)
     return tuple(notes), tuple(notes) if chose is None else (*notes, chose)
 
 
@@ -281,7 +281,7 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     """That a body is not as its file has it, by how much, and the errors without and with it."""
     file, name = model.mjcf_name, " or ".join((found.body, *found.tied))
     score = found.score
-    more = (f"{part} {with_band(*told, INERTIAL[part])}" for part, told in found.told.items())
+    more = (f"{part} {with_band(*told, INERTIAL[part])}" for part, told in found.differing.items())
     said = [
         f"The inertia of body {name} is not as {file} has it (confidence "
         f"{percent(found.confidence)}): it removes {percent(score.part)} of what all joints leave "
@@ -289,8 +289,8 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
         f"{percent(score.control)} (19 of 20 times).",
         f"More than in the file, about its own frame: {', '.join(more)}.",
     ]
-    if found.untold:
-        said.append(f"These joints do not tell its {listed(found.untold)}.")
+    if found.undetermined:
+        said.append(f"These joints do not tell its {listed(found.undetermined)}.")
     errors = [
         f"{axis} {arrow(e.before, e.after, model.axes[axis].units.force)}"
         for axis, e in found.errors.items()

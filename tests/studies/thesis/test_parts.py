@@ -83,7 +83,7 @@ def test_the_behaviours_are_what_they_say_and_lugre_has_its_traits() -> None:
     reached = logs["pre-sliding loops"].axes["x"].position
     assert reached.max() == pytest.approx(behaviours.LOOP.max(), rel=0.1)
     assert np.diff(logs["frictional lag"].truth["x"]["position"][600:]).min() > 0.0
-    found = behaviours.traits(stage, logs, rng)
+    found = behaviours.characteristics(stage, logs, rng)
     assert found["drift"] > 5e-5
     assert found["lag"] > 3e-3
     assert found["fall"] == pytest.approx(0.018, rel=0.05)
