@@ -51,7 +51,7 @@ def behaviours(model: MachineModel, rng: np.random.Generator) -> dict[str, Log]:
 def characteristics(
     model: MachineModel, logs: Mapping[str, Log], rng: np.random.Generator
 ) -> Numbers:
-    """Characteristics of the only effect of a machine's only axis, from its logs of every behaviour.
+    """Characteristics of the only effect of a machine's only axis, from logs of every behaviour.
 
     fall: by which the friction falls below that of the lowest speed. lag: by which it is higher
     where the speed rises than where it falls, at the same speed. slow_push, fast_push: largest
