@@ -12,7 +12,7 @@ from benchmarks.timing import interleaved
 from identify import workflow
 from identify.estimation.variable_projection import absent_effects
 from identify.selection.acceptance import Judged
-from identify.selection.trying import tried_beside
+from identify.selection.trying import Beside, tried_beside
 from twin.core.native import law_address
 from twin.effects import load_catalogue
 from twin.experiments.named import simulate
@@ -47,7 +47,7 @@ def measure() -> list[Figure]:
     def ranked(count: int) -> None:
         with parallel(count):
             for axis, base in fitted.fits.items():
-                tried_beside(Judged(base, fitted.datasets[axis]), catalogue)
+                tried_beside(Judged(base, fitted.datasets[axis]), Beside(catalogue))
 
     runs = interleaved([partial(ranked, 1), partial(ranked, 2)], 1)
     one, two = (float(t) for t in np.median(runs, axis=0))

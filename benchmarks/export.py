@@ -145,13 +145,12 @@ def _gain(effect: str, seed: int) -> Figure:
     training = {name: log for one in logs[: len(TRAINING)] for name, log in one.items()}
     held, test = logs[-2:]
     found = workflow.diagnose(model, training, held, test, catalogue=catalogue)
-    added = workflow.add_named(found)
     what = f"tracking error with the diagnosed feedforward over that without, {effect}"
     named = found.effect.name if found.effect else "nothing"
-    if added is None:
+    if found.effect is None:
         return Figure(what, 1.0, target=Target(high=1 / 3), note=f"named {named}")
-    worth = workflow.feedforward(added.model, test, found.model, machine=machine)
-    axis = worth.axes[added.step.axis]
+    worth = workflow.feedforward(found.model, test, found.fitted, machine=machine)
+    axis = worth.axes[found.leading.dataset.axis]
     assert axis.before is not None
     note = (
         f"{1e6 * axis.before.rms:.3g} um to {1e6 * axis.diagnosed.rms:.3g} um; feedback alone "

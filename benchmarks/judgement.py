@@ -88,6 +88,8 @@ def row_of(case: str, expected: Expected, found: AxisDiagnosis, seconds: float) 
         "named": best != SILENT,
         "findings": findings,
         "small": list(found.small),
+        "contradicted": [f.effect for f in found.contradicted],
+        "doubted": dict(found.doubted),
         "unit": found.dataset.units.force,
         "floor": found.base.floor,
         "errors": {
@@ -111,7 +113,7 @@ def _finding(finding: Finding, mark: str) -> Row:
         "mark": mark,
         "right": mark != WRONG,
         "confidence": finding.confidence,
-        "contradicted": finding.contradicted,
+        "state": finding.state.value,
         "explains": finding.explains,
         "together": list(finding.together),
         "part": score.part,

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from identify.workflow import *
 
 __all__ = [
-    "Addition", "Agreement", "Comparison", "CorrectedBody", "Diagnosis", "Feedforward", "FitResult",
-    "FrequencyResponse", "SimulationFit", "add", "add_shape", "agree", "along_track",
-    "cable_force", "compare", "correct_body",
+    "Addition", "Agreement", "AllAdded", "Comparison", "CorrectedBody", "Diagnosis", "Feedforward",
+    "FitResult", "FrequencyResponse", "SimulationFit", "add", "add_found", "add_shape", "agree",
+    "along_track", "cable_force", "compare", "correct_body",
     "diagnose", "dynamic_friction", "feedforward", "first_model", "fit", "fit_simulation",
     "frequency_response", "friction_map", "plan", "velocity_map",
 ]  # fmt: skip

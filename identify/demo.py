@@ -13,11 +13,12 @@ from identify import workflow
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
-from identify.output.numbers import quantity
+from identify.output.numbers import listed, quantity
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
 from identify.output.words.next_step import Source
-from identify.results.results import Addition, Diagnosis, Feedforward, OnMachine
+from identify.results.results import Diagnosis, Feedforward, OnMachine
+from identify.selection.diagnosis import AxisDiagnosis
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -42,7 +43,6 @@ class Demo:
 
     hidden: Fitted
     diagnosis: Diagnosis
-    addition: Addition | None
     feedforward: Feedforward | None
     report: Path
 
@@ -84,40 +84,31 @@ def demo(
     known = ", ".join(next(iter(model.axes.values())).names)
     say(f"2. the model ({known}) is fitted, and every absent effect tried")
     diagnosis = workflow.diagnose(model, logs, held, test, catalogue=catalogue, progress=progress)
-    addition, worth, final = None, None, diagnosis.model
-    if diagnosis.effect is not None:
-        axis = diagnosis.leading.dataset.axis
-        say(f"3. the diagnosis names {diagnosis.effect.name} on {axis}")
-        addition = workflow.add_named(diagnosis) or workflow.add(
-            diagnosis.effect, diagnosis.model, logs, held, test, axis=axis, progress=progress
-        )
-        final = addition.model
-        say(_fallen(addition))
+    worth, final, found = None, diagnosis.model, diagnosis.leading
+    if found.named:
+        axis = found.dataset.axis
+        say(f"3. the diagnosis names {listed(found.named)} on {axis}")
+        say(_fallen(found, diagnosis.summaries[axis].floor))
         worth = workflow.feedforward(
-            final, test, diagnosis.model, machine=machine, progress=progress
+            final, test, diagnosis.fitted, machine=machine, progress=progress
         )
-        say(_followed(worth, addition.step.axis))
+        say(_followed(worth, axis))
     save_model(final, folder / BETTER)
     report = folder / "report.html"
     subject = Subject(
         f"{model.name}: what the model lacks",
         diagnosis,
         final.history,
-        [addition] if addition else [],
-        source,
-        OnMachine(worth=worth),
+        source=source,
+        machine=OnMachine(worth=worth),
     )
     write_report(report, subject)
-    return Demo(hidden, diagnosis, addition, worth, report)
+    return Demo(hidden, diagnosis, worth, report)
 
 
-def _fallen(addition: Addition) -> str:
-    step = addition.step
-    floor = addition.candidate.fit.floor
-    unit = f"m{step.unit}"
-    before, after = step.test_error_before, step.test_error_after
-    assert before is not None
-    assert after is not None
+def _fallen(found: AxisDiagnosis, floor: float) -> str:
+    before, after = found.tested.before, found.tested.after
+    unit = f"m{found.dataset.units.force}"
     return (
         f"4. added: on the test log, which decided nothing, the force error falls from "
         f"{1e3 * before:.2f} {unit} to {1e3 * after:.2f} {unit}, {before / after:.0f} times; the "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ from identify.output.words.next_step import axis_in_words, notes_in_words
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     Addition,
+    AllAdded,
     AxisSummary,
     Comparison,
     CorrectedBody,
@@ -46,8 +48,10 @@ from identify.results.results import (
     OnMachine,
     SimulationFit,
     addition,
+    steps_together,
     summary_of,
 )
+from identify.selection.acceptance import Judged, score
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect
@@ -247,7 +251,7 @@ def diagnose(
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = result.datasets if body else {axis: d.dataset for axis, d in axes.items()}
     return Diagnosis(
-        model=model,
+        fitted=model,
         axes=axes,
         comparison=_compared(model, prepared, {a: t.floor for a, t in summaries.items()}, progress),
         summaries=summaries,
@@ -323,6 +327,57 @@ def add(
     having = [n for n in names if n not in open_axes]
     made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
     return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
+
+
+@parallel()
+def add_found(
+    found: Model,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    catalogue: Catalogue | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> AllAdded:
+    """Add to a model all that a diagnosis of it found, refit, and record the errors.
+
+    found: the model with it, such as ``Diagnosis.model`` or what ``found_in`` reads of a saved
+    answer. Raises InputError where it has none of the axes of the model, or nothing beyond it.
+    """
+    known = load_catalogue() if catalogue is None else catalogue
+    with_all, given = as_model(found, known), as_model(model, known)
+    if with_all.axes.keys() != given.axes.keys():
+        raise InputError(
+            f"the answer is about a machine with axes {', '.join(with_all.axes)}, the model has "
+            f"{', '.join(given.axes)}; give the model that was diagnosed"
+        )
+    changed = {a: _changed(given.axes[a], with_all.axes[a]) for a in given.axes}
+    if not any(changed.values()) and with_all.mjcf == given.mjcf:
+        raise InputError(
+            f"{given.name}: the answer found nothing that this model lacks; diagnose it again"
+        )
+    job = partial(
+        fit, logs=logs, holdout=holdout, test=test, test_function=test_function, progress=progress
+    )
+    before, after = job(physics_alone(given)), job(with_all)
+    made, kept = replace(after.model, history=before.model.history), True
+    for axis, names in changed.items():
+        if names and axis in after.fits:
+            first, last, dataset = before.fits[axis], after.fits[axis], after.datasets[axis]
+            made = made.with_history(*steps_together(names, first, last, dataset))
+            gain = score(Judged(first, before.datasets[axis]), Judged(last, dataset))
+            kept = kept and gain.accepted
+    return AllAdded(made, before, made.history[len(given.history) :], kept)
+
+
+def _changed(given: AxisModel, other: AxisModel) -> dict[str, bool]:
+    """Laws that an axis has beyond another, or has free; and whether it is another shape of one."""
+    added = {f.effect.name: False for f in other.effects if f.effect.name not in given.names}
+    freed = [f.effect.name for f in given.effects if f.effect.name in other.names]
+    freed = [name for name in freed if given[name].fixed - other[name].fixed]
+    return added | dict.fromkeys(freed, True)
 
 
 @parallel()
@@ -461,24 +516,6 @@ def _or_none(job: Callable[[], Any]) -> Any:
         return job()
     except InputError:
         return None
-
-
-def add_named(found: Diagnosis) -> Addition | None:
-    """What ``add`` makes of the effect that a diagnosis names first, which it has fitted already.
-
-    None where it names none, or names it as one of a pair, and where a body is to be put right
-    before.
-    """
-    leading, best = found.leading, found.leading.best
-    if (
-        found.body is not None
-        or best is None
-        or not best.supported
-        or not any(c is best for c in leading.ranking)
-    ):
-        return None
-    prepared = {axis: one.dataset for axis, one in found.axes.items()}
-    return _with_notes(addition(best, leading.base, prepared, found.model, found.model))
 
 
 @parallel()

@@ -44,7 +44,7 @@ class Case:
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""
         told = {"x": summary_of(x)}
-        return Diagnosis(self.diagnosis.model, {"x": x}, self.diagnosis.comparison, told)
+        return Diagnosis(self.diagnosis.fitted, {"x": x}, self.diagnosis.comparison, told)
 
     @property
     def quiet(self) -> AxisDiagnosis:

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from identify.output.answers import Answer
 
 FOLDER = "folder"
-OUTPUTS = (FOLDER, "out", "html", "mcap", "plot", "setpoints", "video", "rerun")  # what is written
+# What is written.
+OUTPUTS = (FOLDER, "out", "html", "better", "mcap", "plot", "setpoints", "video", "rerun")
 UPDATED = {"fit": "model", "add": "model"}  # what a command may write over: it holds all of it
 AS_JSON = inspect.Parameter(
     "as_json",

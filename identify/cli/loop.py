@@ -9,7 +9,7 @@ from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -41,9 +41,7 @@ if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.next_step import Source
     from identify.results.results import (
-        Addition,
         Comparison,
-        CorrectedBody,
         Diagnosis,
         FitResult,
         SimulationFit,
@@ -134,12 +132,16 @@ def diagnose(
     holdout: Holdout = None,
     test: Test = None,
     html: Report = None,
+    better: Annotated[
+        Path | None,
+        Option("--model", help="Model to write with all that was found, fitted together."),
+    ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
 ) -> Said:
     """Find which physical effect is missing, with the evidence for it.
 
-    Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o diagnosis.html
+    Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o why.html --model better.toml
     """
     from identify import workflow
     from identify.output.as_json import answer_of
@@ -148,9 +150,13 @@ def diagnose(
     machine, catalogue = loaded(model, effects)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
     done = with_logs(job, machine, logs, holdout, test, fits=True)
-    source = _source(model, test_function, effects)
+    source = replace(
+        _source(model, test_function, effects), written=str(better) if better else None
+    )
     if html:
         _report(html, f"{machine.name}: what the model lacks", source, done, logs)
+    if better:
+        _save_with_bodies(done.result.model, better, machine)
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
     return Said(diagnose_text(done.result, source), answer, done.warnings)
 
@@ -161,7 +167,19 @@ def _source(model: str, test_function: float | None, effects: list[Path] | None)
 
     length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
     own = [text for file in effects or () for text in ("--effects", str(file))]
-    return Source(shlex.join(["twin", *sys.argv[1:]]), model, options=shlex.join([*length, *own]))
+    return Source(shlex.join(["twin", *sys.argv[1:]]), model, options=(*length, *own))
+
+
+def _save_with_bodies(made: MachineModel, out: Path, given: MachineModel) -> None:
+    """Write a model, and beside it its MuJoCo file under its own name where it is another one."""
+    from twin.files import write_atomically
+    from twin.model.file import save_model
+
+    if made.mjcf != given.mjcf:
+        file = _copy_of(given, out)
+        made = replace(made, mjcf_name=file.name)
+        write_atomically(file, (made.mjcf or "").encode())
+    save_model(made, out)
 
 
 def _report(
@@ -174,19 +192,22 @@ def _report(
     from identify.output.report.subject import Subject
 
     result = done.result
-    after, before = result.model, None
+    after, before, history = result.model, None, result.model.history
     if isinstance(result, workflow.Diagnosis):
-        after, before = result.final_model, result.model if result.effect else None
+        before, history = result.fitted if result.effect else None, result.fitted.history
     with progress_on_stderr() as progress:
         known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
-    history, findings = result.model.history, done.findings
+    findings = done.findings
     subject = Subject(title, result, history, (), source, machine=known, findings=findings)
     write_report(out, subject)
 
 
 @app.command()
 def add(
-    effect: Annotated[str, Argument(metavar="EFFECT", help="Name from `twin effects`.")],
+    effect: Annotated[
+        str,
+        Argument(metavar="EFFECT", help="Name from `twin effects`; with --found an answer's file."),
+    ],
     model: Model,
     logs: FitLogs,
     out: Annotated[Path, written("Model with the effect.")],
@@ -200,31 +221,35 @@ def add(
         bool,
         Option("--shape", help="The model has the effect: give its law the shape found."),
     ] = False,
+    found: Annotated[
+        bool,
+        Option("--found", help="Add all that EFFECT found: an answer of `twin diagnose --json`."),
+    ] = False,
     effects: Effects = None,
 ) -> Said:
     """Add an effect, or the shape of one, refit, and record the error before and after.
 
     Of a machine of joints, link_mass corrects a body: it is written into a copy of the MuJoCo file.
+    With --found, EFFECT is a saved answer, and all that it found is added.
 
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
     from identify import workflow
     from identify.links import LINK_MASS
-    from twin.files import write_atomically
-    from twin.model.file import save_model
+    from identify.output.as_json import found_in
 
     machine, catalogue = loaded(model, effects)
-    job: Callable[..., Addition | CorrectedBody]
-    if file := _copy_of(machine, out) if effect == LINK_MASS else None:
+    job: Callable[..., Any]  # an Addition, AllAdded or a CorrectedBody
+    if found:
+        with_all = found_in(Path(effect), machine, catalogue)
+        job = partial(workflow.add_found, with_all, test_function=test_function)
+    elif file := _copy_of(machine, out) if effect == LINK_MASS else None:
         job = partial(workflow.correct_body, file=file.name, test_function=test_function)
     else:
         call = workflow.add_shape if shape else workflow.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
-    done: Done[Addition | CorrectedBody] = with_logs(job, machine, logs, holdout, test, fits=True)
-    made = done.result.model
-    if file:
-        write_atomically(file, (made.mjcf or "").encode())
-    save_model(made, out)
+    done: Done[Any] = with_logs(job, machine, logs, holdout, test, fits=True)
+    _save_with_bodies(done.result.model, out, machine)
     return said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
 
 
@@ -418,7 +443,6 @@ def demo(
         result,
         hidden=hidden,
         diagnosis=answer_of(result.diagnosis),
-        addition=result.addition and answer_of(result.addition),
         feedforward=result.feedforward and answer_of(result.feedforward),
     )
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"

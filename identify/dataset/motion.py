@@ -159,8 +159,9 @@ class Motion:
     others, by name. velocity_weight: 1, of a measured velocity beside the readings
     (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the readings
     err along the track (identify.dataset.readings). ahead: s, by which the command was moved ahead
-    of how it was logged. bodies: of a joint of a mechanism, over as many samples as raw; None for a
-    plain axis, whose mass is all that it moves.
+    of how it was logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a
+    joint of a mechanism, over as many samples as raw; None for a plain axis, whose mass is all that
+    it moves.
     """
 
     name: str
@@ -179,6 +180,7 @@ class Motion:
     velocity_weight: float = 0.0
     ripples: tuple[float, ...] = ()
     ahead: float = 0.0
+    as_logged: Array | None = None
     bodies: Bodies | None = None
 
     def __repr__(self) -> str:
@@ -209,14 +211,19 @@ class Motion:
             track=self.track.during(blocks),
             others=np.ascontiguousarray(self.others[:, blocks]),
             bodies=None if self.bodies is None else self.bodies.during(at),
+            as_logged=None if self.as_logged is None else self.as_logged[at],
             beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
     def with_force_ahead(self, shift: float) -> Motion:
-        """The same with its command moved ahead by ``shift`` seconds."""
-        at = np.arange(self.raw.shape[1], dtype=float)
-        moved = self.with_force(np.interp(at + shift / self.sample_period, at, self.raw[1]))
-        return replace(moved, ahead=self.ahead + shift)
+        """The same with its command moved ahead by ``shift`` seconds.
+
+        Always from how it was logged: to move it there and back between samples would smooth it.
+        """
+        logged = self.raw[1].copy() if self.as_logged is None else self.as_logged
+        ahead, at = self.ahead + shift, np.arange(len(logged), dtype=float)
+        moved = self.with_force(np.interp(at + ahead / self.sample_period, at, logged))
+        return replace(moved, ahead=ahead, as_logged=logged)
 
     def with_force(self, force: Array) -> Motion:
         """The same under another force (n * samples a block,) N, at the log's own rate."""

@@ -34,8 +34,21 @@ from twin.signals import Array
 def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     """The fit of an axis, and the dataset with its channel delay removed.
 
-    The time origins of its logs are set by the phase of what repeats in time.
+    The time origins of its logs are set by the phase of what repeats in time. A model that was
+    fitted before begins with the channel delay that its values tell: without it, the fit would
+    leave them.
     """
+    known = _moved_by_values(axis, dataset)
+    begun = [dataset, known] if known is not dataset else [dataset]
+    dataset, fit = min((_shifted(axis, each) for each in begun), key=lambda one: one[1].error)
+    if not depends_on_time_origin(fit.axis, dataset):
+        return synchronised(fit, dataset)
+    dataset = with_time_origins(fit.axis, dataset)
+    return dataset, fit_multistart(fit.axis, dataset, fit.begun)
+
+
+def _shifted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
+    """The fit of an axis, and the dataset without the channel delay that the fit finds."""
     fit = fit_multistart(axis, dataset)
     while shift := misalignment(fit, dataset):
         moved = realigned(dataset, dataset.channel_delay + shift)
@@ -43,10 +56,12 @@ def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
         if again.error > RULE.fallen * fit.error:
             break
         dataset, fit = moved, again
-    if not depends_on_time_origin(fit.axis, dataset):
-        return synchronised(fit, dataset)
-    dataset = with_time_origins(fit.axis, dataset)
-    return dataset, fit_multistart(fit.axis, dataset, fit.begun)
+    if dataset.channel_delay:  # to its best value, be the last step too small to tell a delay by
+        last, _, _ = _linear_shift(fit, dataset)
+        moved = realigned(dataset, max(dataset.channel_delay + last, 0.0))
+        again = replace(fit_axis(fit.axis, moved.training), begun=fit.begun)
+        dataset, fit = (moved, again) if again.error < fit.error else (dataset, fit)
+    return dataset, fit
 
 
 def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
@@ -54,6 +69,11 @@ def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
 
     No parameter is fitted; ``fit_aligned`` does the same together with a fit.
     """
+    return with_time_origins(axis, _moved_by_values(axis, dataset))
+
+
+def _moved_by_values(axis: AxisModel, dataset: Dataset) -> Dataset:
+    """The dataset without the channel delay that an axis with its present values finds."""
     fit = finished(axis, axis, dataset.training, Outcome.CONVERGED)
     while len(fit.residual) and (shift := misalignment(fit, dataset)):
         moved = realigned(dataset, dataset.channel_delay + shift)
@@ -61,7 +81,7 @@ def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
         if again.error > RULE.fallen * fit.error:
             break
         dataset, fit = moved, again
-    return with_time_origins(axis, dataset)
+    return dataset
 
 
 def misalignment(fit: Fit, dataset: Dataset) -> float:
@@ -71,20 +91,25 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     fit. Where the dataset has a channel delay already, the result is the change of it; the delay as
     a whole is never negative.
     """
-    rates = [log.fine.acceleration(log.motion.raw[1]) for log in dataset.training]
-    rate = np.concatenate(rates)[fit.kept]
-    left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
-    power = float(own @ own)
-    if power <= ROUNDING * float(rate @ rate):
-        return 0.0
-    shift = -float(own @ left) / power
-    after = left + shift * own
+    shift, left, after = _linear_shift(fit, dataset)
     fallen = rms(after) < RULE.fallen * rms(left)
     longest = max(log.motion.sample_period for log in dataset.training)
     samples = (dataset.channel_delay + shift) / longest
     possible = RULE.least_shift < samples < RULE.most_shift
     told = possible and fallen and evidence(left, after, 1).delta_bic > RULE.least_bic
     return shift if told else 0.0
+
+
+def _linear_shift(fit: Fit, dataset: Dataset) -> tuple[float, Array, Array]:
+    """The shift of the force (s) that a linear step finds; N that is left without and with it."""
+    rates = [log.fine.acceleration(log.motion.raw[1]) for log in dataset.training]
+    rate = np.concatenate(rates)[fit.kept]
+    left, own = unabsorbed(fit.residual, fit.basis), unabsorbed(rate, fit.basis)
+    power = float(own @ own)
+    if power <= ROUNDING * float(rate @ rate):
+        return 0.0, left, left
+    shift = -float(own @ left) / power
+    return shift, left, left + shift * own
 
 
 def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:

@@ -45,7 +45,7 @@ class Fit:
     """A fitted axis.
 
     residual (n,): N at the end, of the test functions that carry information (kept). begun: the
-    axis that the fit started from.
+    axis as it was given; in a search it has nothing of what was changed since.
     """
 
     axis: AxisModel

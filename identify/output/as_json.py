@@ -6,12 +6,18 @@
 from __future__ import annotations
 
 import json
+import tomllib
+from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
 from identify.output.answers import SCHEMA, Answer, answer_of, diagnoses, fits, frequency, machine
+from twin.effects import Catalogue
+from twin.errors import InputError
 from twin.files import write_atomically
+from twin.model.file import parse_model
+from twin.model.machine import MachineModel
 from twin.schemas import FOLDER
 
 FILE = FOLDER / "answers.schema.json"
@@ -20,6 +26,28 @@ FILE = FOLDER / "answers.schema.json"
 def json_of(result: Any, **more: Any) -> dict[str, Any]:
     """The object that the command of a result prints; more: entries that the command adds."""
     return answer_of(result, **more).entries()
+
+
+def found_in(path: Path, given: MachineModel, catalogue: Catalogue) -> MachineModel:
+    """The model with all that a diagnosis of a model found, of the file of its saved answer.
+
+    Raises InputError, in one line, where the file is none.
+    """
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))
+        text = entries["model"] if entries["schema"] == _place(diagnoses.DiagnosisAnswer) else None
+    except (OSError, ValueError, TypeError, KeyError):
+        text = None
+    if not isinstance(text, str):
+        raise InputError(
+            f"{path}: is no answer of a diagnosis; give what `twin diagnose ... --json` printed in "
+            "the place of EFFECT"
+        )
+    return parse_model(tomllib.loads(text), catalogue, entries["mujoco"] or given.mjcf, str(path))
+
+
+def _place(answer: type[Answer]) -> str:
+    return f"{SCHEMA}#/$defs/{answer.__name__}"
 
 
 def answers() -> list[type[Answer]]:
@@ -42,8 +70,7 @@ def schema_text() -> str:
     _, made = models_json_schema([(a, "serialization") for a in every], schema_generator=_Plain)
     for answer in every:
         own = made["$defs"][answer.__name__]
-        place = {"const": f"{SCHEMA}#/$defs/{answer.__name__}"}
-        own["properties"] = {"schema": place, **own["properties"]}
+        own["properties"] = {"schema": {"const": _place(answer)}, **own["properties"]}
         own["required"] = [*own["required"], "schema"]
     document = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

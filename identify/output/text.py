@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
-from identify.output.numbers import DisplayUnit, arrow, change, number, quantity
+from identify.output.numbers import DisplayUnit, arrow, change, listed, number, quantity
 from identify.output.words.diagnosis import (
     all_found,
     named_in_words,
@@ -38,6 +38,7 @@ from identify.output.words.next_step import (
     experiment_in_words,
     gap_in_words,
     in_order,
+    model_in_words,
     names_of,
     question_in_words,
     supposed_in_words,
@@ -46,6 +47,7 @@ from identify.output.words.next_step import (
 from identify.results import figure_of, html_of, text_of
 from identify.results.results import (
     Addition,
+    AllAdded,
     Comparison,
     CorrectedBody,
     Diagnosis,
@@ -60,6 +62,7 @@ from identify.selection.nonparametric import nonparametric_labels
 from identify.validation.agreement import Agreement
 from identify.validation.comparison import AxisComparison
 from twin.experiments.file import in_short
+from twin.model.machine import HistoryStep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,11 +160,14 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
             lines += [f"  {first}", *(f"    {other}" for other in others)]
         rest = (said.beside, said.shapes, said.left, said.advice)
         lines += [f"  {sentence}" for sentences in rest for sentence in sentences]
-        lines += [f"  next: {source.filled(c, names_of(d.dataset))}" for c in said.commands]
+        steps = source.still_to_do(said.commands, names_of(d.dataset))
+        lines += [f"  next: {text}" for text in steps]
         lines += _candidates(d)
         lines += [f"  {line}" for line in said.steps]
         lines += [f"  note: {note}" for note in said.notes]
-    still = (axis for axis in result.model.axes if axis not in result.axes)
+    if source.written:
+        lines.append(f"{source.written}: {model_in_words(result)}")
+    still = (axis for axis in result.fitted.axes if axis not in result.axes)
     lines += [f"axis {axis}: not diagnosed, as it moves in no log" for axis in still]
     return "\n".join(lines)
 
@@ -216,9 +222,7 @@ def add_text(result: Addition) -> str:
     lines = [f"added {step.effect} to axis {step.axis}"]
     if result.reshaped:
         lines = [f"gave {step.effect} of axis {step.axis} the shape that the logs show"]
-    for role, (before, after) in errors_of_step(step).items():
-        what = words(f"force error on the {role.value} logs")
-        lines.append(f"  {what:33s} {arrow(before, after, step.unit)}")
+    lines += _errors_of(step, words)
     if result.position_error is not None and result.replayed is not None:
         unit = result.units.position
         scale = DisplayUnit.of(unit, result.position_error)
@@ -234,6 +238,30 @@ def add_text(result: Addition) -> str:
             "it needs another beside it, add that to the new model and judge then."
         )
     return "\n".join(lines)
+
+
+@text_of.register
+def all_added_text(result: AllAdded) -> str:
+    """What was added to each axis, and the errors before and after all of it."""
+    lines = []
+    for axis in dict.fromkeys(step.axis for step in result.steps):
+        steps = [step for step in result.steps if step.axis == axis]
+        words = result.model.axes[axis].units.words
+        lines.append(f"added {listed([step.effect for step in steps])} to axis {axis}")
+        lines += _errors_of(steps[0], words)
+    if not result.kept:
+        lines.append(
+            "  These logs do not prove all of it: go on with the model before, or diagnose it with "
+            "them."
+        )
+    return "\n".join(lines)
+
+
+def _errors_of(step: HistoryStep, words: Callable[[str], str]) -> Iterator[str]:
+    """The errors before and after a step on the logs of each role, a line each."""
+    for role, (before, after) in errors_of_step(step).items():
+        what = words(f"force error on the {role.value} logs")
+        yield f"  {what:33s} {arrow(before, after, step.unit)}"
 
 
 @text_of.register

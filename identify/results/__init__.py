@@ -33,7 +33,11 @@ def figure_of(result: object, coordinate: str | None, axis: str | None) -> Figur
 class Printed:
     """A result whose ``str`` is the text that its command prints; in a notebook, tables."""
 
-    model: MachineModel
+    if TYPE_CHECKING:
+
+        @property
+        def model(self) -> MachineModel:
+            """The machine that it is about."""
 
     def __str__(self) -> str:
         return text_of(self)

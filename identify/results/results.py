@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 from identify.dataset.dataset import Dataset, Role, by_log
 from identify.dataset.noise_floor import NoiseFloor, floor_of
@@ -12,13 +14,14 @@ from identify.estimation.fit import Errors, Fit, error_if_any, error_in
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
-from identify.links import WrongBody
+from identify.links import WrongBody, corrected
 from identify.results import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.findings import FindingKind
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import errors_of_both
 from identify.validation.misfit_maps import Region
@@ -28,6 +31,7 @@ from twin.feedforward import followed
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 from twin.model.units import AxisUnits
+from twin.mujoco.written import inertial
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -185,7 +189,7 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
 class Diagnosis(Pictured):
     """Diagnoses by axis; the answer is that of the axis with the strongest evidence.
 
-    model: with the values of the fit before anything was found. summaries: of each axis.
+    fitted: the model with the values of the fit before anything was found. summaries: of each axis.
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
     refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
     that depend on the other axis, on a machine with more than two axes. not_planned: for an
@@ -194,7 +198,7 @@ class Diagnosis(Pictured):
     its file; the diagnoses are those with it as it was found.
     """
 
-    model: MachineModel
+    fitted: MachineModel
     axes: Mapping[str, AxisDiagnosis]
     comparison: Comparison
     summaries: Mapping[str, AxisSummary]
@@ -205,12 +209,19 @@ class Diagnosis(Pictured):
     left_over: Mapping[str, Region] = field(default_factory=dict)
     body: WrongBody | None = None
 
-    @property
-    def final_model(self) -> MachineModel:
-        """The model with everything that was found."""
-        model = self.model
+    @cached_property
+    def model(self) -> MachineModel:
+        """The model with everything that was found, fitted together, and how its errors fell."""
+        model, body = self.fitted, self.body
+        if body is not None and body.element is not None and model.joints:
+            model = corrected(model, body, inertial(*body.element), f"{model.name}_corrected.xml")
         for axis, found in self.axes.items():
-            model = model.with_axis(axis, found.final.axis) if found.findings else model
+            if found.findings:
+                mass = found.final.axis.mass if body is None else model.axes[axis].mass
+                model = model.with_axis(axis, replace(found.final.axis, mass=mass))
+                after = self.summaries[axis].after
+                model = model.with_intervals(axis, intervals_to_keep(found.final, after))
+                model = model.with_history(*_steps_of(found))
         return model
 
     @property
@@ -230,6 +241,27 @@ class Diagnosis(Pictured):
         """The effect that is named, if any."""
         best = self.leading.best
         return best.effect if best else None
+
+
+def _steps_of(found: AxisDiagnosis) -> Iterator[HistoryStep]:
+    """What a diagnosis did to the errors, for each law that it added or changed."""
+    changed = {f.effect: f.kind is FindingKind.WRONG_SHAPE for f in found.findings}
+    return steps_together(changed, found.base, found.final, found.dataset)
+
+
+def steps_together(
+    changed: Mapping[str, bool], before: Fit, after: Fit, dataset: Dataset
+) -> Iterator[HistoryStep]:
+    """A step for each law of an axis that was changed, with the errors without and with all.
+
+    changed: by name of the law, whether it got another shape.
+    """
+    errors = _errors_of(before, after, dataset)
+    for name, is_shape in changed.items():
+        others = ", ".join(other for other in changed if other != name)
+        notes = (f"together with {others}; the errors are those of all",) if others else ()
+        action = "shape" if is_shape else "add"
+        yield HistoryStep(action, name, dataset.axis, **errors, notes=notes)
 
 
 # --- what was added, or corrected -----------------------------------------------------------------
@@ -280,6 +312,20 @@ class Addition(Printed):
     def units(self) -> AxisUnits:
         """Of the axis that the effect was added to."""
         return self.candidate.fit.axis.units
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllAdded(Printed):
+    """A model with all that an answer found, fitted together.
+
+    given: the model before, fitted. steps: by axis what was added and its errors without and with
+    all of it. kept: whether the logs prefer it on every axis that it changed.
+    """
+
+    model: MachineModel
+    given: FitResult
+    steps: tuple[HistoryStep, ...]
+    kept: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -334,11 +380,18 @@ def _step(best: Candidate, base: Fit, dataset: Dataset, shape: Reshaped | None) 
         action="shape" if shape else "add",
         effect=shape.name if shape else best.effect.name,
         axis=best.axis,
-        fit_error_before=base.error,
-        fit_error_after=best.fit.error,
-        holdout_error_before=error_if_any(Role.SELECTION, base, dataset),
-        holdout_error_after=error_if_any(Role.SELECTION, best.fit, dataset),
-        test_error_before=error_if_any(Role.TEST, base, dataset),
-        test_error_after=error_if_any(Role.TEST, best.fit, dataset),
-        unit=best.fit.axis.units.force,
+        **_errors_of(base, best.fit, dataset),
     )
+
+
+def _errors_of(before: Fit, after: Fit, dataset: Dataset) -> dict[str, Any]:
+    """The errors of a step on the logs of each role, with their unit."""
+    return {
+        "fit_error_before": before.error,
+        "fit_error_after": after.error,
+        "holdout_error_before": error_if_any(Role.SELECTION, before, dataset),
+        "holdout_error_after": error_if_any(Role.SELECTION, after, dataset),
+        "test_error_before": error_if_any(Role.TEST, before, dataset),
+        "test_error_after": error_if_any(Role.TEST, after, dataset),
+        "unit": after.axis.units.force,
+    }

@@ -17,6 +17,7 @@ thresholds (``RULE``):
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
-from identify.dataset.prepared_log import moving, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
 from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
@@ -127,14 +128,13 @@ class Judged:
     def other(self) -> Array:
         """The same (m,) N of logs that were not fitted."""
         fit, logs = self.fit, self.dataset.selection
-        if not logs:
-            columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
-            rows = self._smoothing
-            left = left_out(fit.residual, columns, rows.T @ rows)
-            out[fit.kept] = left / fit.lessened
-            return out
-        kept = moving(logs, sticks(fit.axis))
-        return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
+        if logs:
+            return left_on(fit, logs)
+        columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
+        rows = self._smoothing
+        left = left_out(fit.residual, columns, rows.T @ rows)
+        out[fit.kept] = left / fit.lessened
+        return out
 
     def tell(self) -> None:
         """Compute what a score asks for, and let go of the matrices that it takes."""
@@ -177,6 +177,12 @@ class Judged:
         """Whether noise is all that is left, on the training logs and on those not fitted."""
         tells = self.dataset.selection and np.isfinite(self.other_error)
         return self.fit.at_floor and (self.other_at_floor or not tells)
+
+
+def left_on(fit: Fit, logs: Sequence[PreparedLog]) -> Array:
+    """Residual (n,) N of a fit on other logs; not a number where it tells nothing."""
+    kept = moving(logs, sticks(fit.axis))
+    return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
 
 
 def least_t(among: int) -> float:

@@ -238,13 +238,13 @@ def control(change: Change, without: Judged, fit: Judged) -> float:
 def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
     """The best of a first fit and of those from all other starts.
 
-    The effect was missing when the base was fitted, which distorts its values, so one start has
-    those that the base began with.
+    The effect was missing when the fit before was made, which distorts its values, so one start has
+    those of the model as it was given.
     """
     change, logs, axes = screening.change, judged.dataset.training, screening.axes[1:]
     if not isinstance(change, Added):
         return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
-    begun = judged.fit.begun.with_effect(first.axis[change.name])
+    begun = judged.fit.axis.begun_as(judged.fit.begun).with_effect(first.axis[change.name])
     fits = [first, *(fit_axis(axis, logs) for axis in (begun, *axes))]
     return simplified(min(fits, key=lambda f: f.error), judged, change.effect)
 

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Errors, Fit, finished, fit_axis, fit_roughly
+from identify.estimation.fit import Errors, Fit, finished
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
-from identify.estimation.residual_noise import with_own_noise
 from identify.rules import RULE
-from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
-from identify.selection.changes import Added, Screening, control
-from identify.selection.findings import Finding, FindingKind, findings_of, without_law
-from identify.selection.search import Found, Step, is_tied, search
-from identify.selection.trying import Tried
-from twin.effect import Kind
+from identify.selection.changes import Added, control
+from identify.selection.doubts import concluded
+from identify.selection.findings import Finding, FindingKind
+from identify.selection.search import Found, Step
 from twin.effects import Catalogue
-from twin.model.machine import AxisModel, Fitted
 from twin.parallel import Progress, silent
-
-ALIKE = (Kind.FRICTION, Kind.STRUCTURE)  # whose values of one name mean the same in each
 
 
 class Verdict(Enum):
@@ -40,7 +35,9 @@ class AxisDiagnosis:
 
     base: the fitted model. ranking: absent effects beside it, proved ones first. steps: every
     change that was accepted on the way. final: the fit with those that are needed at the end.
-    findings: what each of these explains. unexplained: what the residual depends on, where it is
+    findings: what each of these explains. contradicted: findings that the test logs refuse, which
+    the final fit is without. doubted: by name of each law that was taken out at the end, why, in
+    words. unexplained: what the residual depends on, where it is
     not noise. small: effects that the data show and that take too little to matter. repeat: a force
     that repeats along the track in each log, but at other places in each.
     """
@@ -52,6 +49,8 @@ class AxisDiagnosis:
     final: Fit
     verdict: Verdict
     findings: tuple[Finding, ...] = ()
+    contradicted: tuple[Finding, ...] = ()
+    doubted: Mapping[str, str] = field(default_factory=dict)
     unexplained: Dependence | None = None
     small: tuple[str, ...] = ()
     repeat: Repeat | None = None
@@ -119,9 +118,8 @@ def diagnose_axis(
     if any(log.force_noise for log in dataset.training):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.training, base.outcome)
-    searched = search(base, dataset, catalogue, progress)
-    progress("what each finding explains", 0, 1)
-    found, findings = _proved(_with_ties(searched))
+    ended = concluded(base, dataset, catalogue, progress)
+    found, findings = ended.found, ended.findings
     final = found.final
     # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
@@ -133,6 +131,8 @@ def diagnose_axis(
         final=final.fit,
         verdict=_verdict(findings, quiet),
         findings=findings,
+        contradicted=ended.contradicted,
+        doubted=ended.doubted,
         unexplained=None if quiet else find_dependence(final.fit, found.dataset),
         small=_small(found),
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
@@ -145,101 +145,6 @@ def _verdict(findings: tuple[Finding, ...], quiet: bool) -> Verdict:
     if findings:
         return Verdict.WRONG_SHAPE
     return Verdict.NOTHING_MISSING if quiet else Verdict.UNEXPLAINED
-
-
-def _proved(found: Found) -> tuple[Found, tuple[Finding, ...]]:
-    """What was found and is accepted beside all else at the end, the weakest left out first."""
-    ended = _with_own_noise(found)
-    findings = findings_of(ended)
-    # A curve whose band holds the law everywhere tells nothing beside other findings.
-    sure = [f for f in findings if f.is_sure] or findings
-    no = {f.effect: f.doubt or replace(f.score, among=1).refused for f in findings}
-    doubted = [f for f in findings if no[f.effect] or f not in sure]
-    if not doubted:
-        return ended, findings
-    weakest = min(doubted, key=lambda f: f.score.part)
-    rest = _proved(without_law(weakest.effect, found))  # what is noise beside it is so no more
-    if no[weakest.effect] or len(rest[1]) == len(findings) - 1:
-        return rest
-    return ended, findings  # others need the curve, whatever its band
-
-
-def _with_own_noise(found: Found) -> Found:
-    """What a search found, with what is left at the end as noise, where nothing predicts it."""
-    noisy, final = with_own_noise(found.final.fit, found.dataset)
-    if noisy is found.dataset:
-        return found
-    begun, ended = found.base.fit, Judged(final, noisy)
-    if found.final.fit is begun:
-        return replace(found, dataset=noisy, base=ended, final=ended)
-    base = finished(begun.axis, begun.begun, noisy.training, begun.outcome)
-    return replace(found, dataset=noisy, base=Judged(base, noisy), final=ended)
-
-
-def _with_ties(found: Found) -> Found:
-    """What a search found, with ties decided beside all that was found.
-
-    When an early change was compared with its rivals, the later ones were still missing. Of a
-    friction or a resonance all others are rivals, whatever their own fits ended in.
-    """
-    if len(found.steps) < 2 and not any(_others_alike(s, found) for s in found.steps):
-        return found
-    return replace(found, steps=tuple(_compared_again(s, found) for s in found.steps))
-
-
-def _compared_again(step: Step, found: Found) -> Step:
-    final, names = found.final, {s.change.name for s in found.steps}
-    axis = step.change.undone(final.fit.axis, found.base.fit.axis)
-    if axis is None:
-        return replace(step, tied=())
-    own = replace(step.tried, judged=final)
-
-    def beside(rival: Tried) -> bool:
-        if rival.change.name in names:
-            return False
-        if not isinstance(rival.change, Added):
-            return True
-        law = rival.judged.fit.axis[rival.change.name]
-        laws = [law] if rival.candidate.score else []
-        if law.effect.kind in ALIKE:  # whose values were those of another model
-            laws.append(_as_free_as(final.fit.axis[step.change.name], law))
-        return any(
-            _is_tied_with(axis.with_effect(each), rival, own, found.dataset) for each in laws
-        )
-
-    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
-    return replace(step, tied=tuple(t for t in rivals.values() if beside(t)))
-
-
-def _is_tied_with(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) -> bool:
-    """Whether a rival is level with what was found, as this axis begins its fit."""
-
-    def is_tied_by(fit: Fit) -> bool:
-        return is_tied(replace(rival, judged=Judged(fit, dataset)), own)
-
-    rough = fit_roughly(axis, dataset.training)  # a better fit is no less level
-    return is_tied_by(rough) or is_tied_by(fit_axis(rough.axis, dataset.training))
-
-
-def _others_alike(step: Step, found: Found) -> list[Tried]:
-    """All others of the catalogue, where a friction or a resonance was added."""
-    kind = step.change.effect.kind
-    if not isinstance(step.change, Added) or kind not in ALIKE:
-        return []
-    own = {p.name for p in step.change.effect.parameters if not p.strength}
-    others = (c for c in found.ranking if c.effect.kind is kind and not c.doubt)
-    rivals = [c for c in others if own & {p.name for p in c.effect.parameters}]
-    changes = [Added(c.effect) for c in rivals]
-    return [
-        Tried(change, Screening(change, 0.0), Judged(c.fit, found.dataset), c)
-        for change, c in zip(changes, rivals, strict=True)
-    ]
-
-
-def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
-    """A law with the values of another, and as free, where both have a parameter of that name."""
-    free = {n: v for n, v in other.values.items() if n in law.values and n not in other.fixed}
-    return replace(law, values={**law.values, **free}, fixed=law.fixed.difference(free))
 
 
 def _small(found: Found) -> tuple[str, ...]:

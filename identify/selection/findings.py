@@ -87,6 +87,17 @@ class FindingKind(Enum):
     RESEMBLES = "resembles"
 
 
+class Confirmation(Enum):
+    """What the test logs, on which nothing was decided, say of a finding.
+
+    With it their error falls; or it rises; or it is as before, or there are none.
+    """
+
+    CONFIRMED = "confirmed"
+    CONTRADICTED = "contradicted"
+    UNTESTED = "untested"
+
+
 @dataclass(frozen=True)
 class Finding:
     """A missing effect, or one whose law has the wrong shape, that the data prove.
@@ -99,7 +110,9 @@ class Finding:
     of its law.
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
     that curve, where it has such a parameter. left, left_fitted: over the noise floor, the error
-    that all findings together leave on the logs that chose, and on the training logs.
+    that all findings together leave on the logs that chose, and on the training logs. doubt: why
+    its values cannot be its own, in words; None where they can. quiet: whether what is left without
+    it is noise.
     """
 
     effect: str
@@ -117,13 +130,26 @@ class Finding:
     left: float = 1.0
     left_fitted: float = 1.0
     doubt: str | None = None
+    quiet: bool = False
     parameter_units: dict[str, str] = field(default_factory=dict)
     equation: str = ""
 
     @property
-    def contradicted(self) -> bool:
-        """Whether the test error, on which nothing was decided, hardly falls with it."""
-        return self.tested.on is Role.TEST and self.tested.after > BETTER * self.tested.before
+    def state(self) -> Confirmation:
+        """What the test logs say of it."""
+        before, after = self.tested.before, self.tested.after
+        if self.tested.on is not Role.TEST or not min(before, after) < BETTER * max(before, after):
+            return Confirmation.UNTESTED
+        return Confirmation.CONFIRMED if after < before else Confirmation.CONTRADICTED
+
+    @property
+    def refused(self) -> str | None:
+        """Why it is not proved beside all else that was found, in words; None where it is.
+
+        It was chosen of many before; here it is asked alone.
+        """
+        no = "what is left without it is noise" if self.quiet else None
+        return self.doubt or no or replace(self.score, among=1).refused
 
     @property
     def is_sure(self) -> bool:
@@ -135,7 +161,8 @@ class Finding:
     @property
     def confidence(self) -> float | None:
         """How often such an answer was right, 0..1; None where test logs contradict it."""
-        return None if self.contradicted else confidence(self.score.part, self.score.t)
+        refuted = self.state is Confirmation.CONTRADICTED
+        return None if refuted else confidence(self.score.part, self.score.t)
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:
@@ -155,21 +182,25 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
 
 
 def without_law(name: str, found: Found) -> Found:
-    """What was found without all changes of one law, the rest refitted."""
+    """What was found without all changes of one law, the rest fitted again from the base."""
     own = [s for s in found.steps if s.change.name == name]
     rest = tuple(s for s in found.steps if s not in own)
     return replace(found, final=_without(own, found), steps=rest)
 
 
 def _without(steps: Sequence[Step], found: Found) -> Judged:
-    """The final fit without some steps, refitted; of long logs on the part that was searched."""
-    axis = found.final.fit.axis
+    """The final fit without some steps, refitted; of long logs on the part that was searched.
+
+    From its own values too, and from those of the base, as what is taken out had moved the others.
+    """
+    axis, base = found.final.fit.axis, found.base.fit.axis
     for step in reversed(steps):
-        axis = step.change.undone(axis, found.base.fit.axis) or axis
+        axis = step.change.undone(axis, base) or axis
     if len(steps) == len(found.steps):
         return found.base
     dataset = found.dataset
-    fits = [fit_axis(a, dataset.part.training) for a in (axis, *_alike(axis, found.passed))]
+    begun = (axis, axis.begun_as(base), *_alike(axis, found.passed))
+    fits = [fit_axis(a, dataset.part.training) for a in begun]
     less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
     if dataset.part is not dataset:
         less = finished(less.axis, less.begun, dataset.training, less.outcome)
@@ -219,6 +250,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
         together=tuple(others) if any(s.with_others for s in steps) else (),
         doubt=None if alone else _doubt(steps[0].change, less, final),
+        quiet=less.at_floor and not alone,
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)
@@ -226,9 +258,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
 
 
 def _doubt(change: Change, less: Judged, final: Judged) -> str | None:
-    """Why a change is not proved whatever it takes, in words; None where it may be."""
-    if less.at_floor:
-        return "what is left without it is noise"
+    """Why the values of a change cannot be its own, in words; None where they can."""
     return doubt(less, final.fit, change.effect, parameters(change))
 
 

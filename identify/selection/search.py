@@ -2,9 +2,10 @@
 
 Forward: of all changes that are accepted, the one that leaves least; of those tied with it, the one
 with the fewest parameters, unless the selection logs ask for another. Backward: an earlier change
-that is not accepted beside the later ones goes. Where no change is accepted alone, those that come
-nearest are followed one round further: two that are accepted together, and each beside the other,
-are needed together.
+that is not accepted beside the later ones goes, and all else is fitted again from the model as it
+was given, of which it has moved no value; it may be asked for again later. Where no change is
+accepted alone, those that come nearest are followed one round further: two that are accepted
+together, and each beside the other, are needed together.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ from identify.selection.changes import (
 from identify.selection.controls import ControlTest
 from identify.selection.trying import (
     LEADERS,
+    Beside,
     Tried,
+    fitted_anew,
     judged_change,
     refitted_on,
     settled,
@@ -74,7 +77,8 @@ class Found:
 
     base: the fit before, at its best. steps: the changes that were accepted and are needed still.
     passed: all that were accepted on the way. final: the fit with the steps. ranking: every absent
-    effect beside the base. last: the changes that were tried beside the final fit.
+    effect beside the base. last: the changes that were tried beside the final fit. barred: names of
+    laws that were doubted, of which no change is tried.
     """
 
     dataset: Dataset
@@ -84,20 +88,26 @@ class Found:
     passed: tuple[Step, ...]
     ranking: tuple[Candidate, ...]
     last: tuple[Tried, ...]
+    barred: frozenset[str] = frozenset()
 
 
 def search(base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress = silent) -> Found:
-    """Change one fitted axis while changes are accepted.
+    """Change one fitted axis while changes are accepted."""
+    judged = Judged(base, dataset)
+    return resumed(Found(dataset, judged, judged, (), (), (), ()), catalogue, progress)
+
+
+def resumed(found: Found, catalogue: Catalogue, progress: Progress = silent) -> Found:
+    """Go on from what was found, while changes are accepted.
 
     Long logs are searched by their beginnings, with one fit of the answer to all of them; where
     this leaves clearly more, it goes on from there on all of them.
     """
-    part = dataset.part
-    if part is dataset:
-        return _search(_begun(base, dataset), catalogue, progress)
+    dataset, base = found.dataset, found.base.fit
+    if dataset.part is dataset:
+        return _search(found, catalogue, progress)
     base.forget()  # of all of the logs; it is asked for them when the search has ended
-    begun = replace(fit_axis(base.axis, part.training), begun=base.begun)
-    found = _search(_begun(begun, part), catalogue, progress)
+    found = _search(_on_part(found), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
     _forget(_fits_of(found))
     whole = _on_whole(found, base, dataset)
@@ -123,10 +133,12 @@ def _forget(fits: Iterable[Fit]) -> None:
     trim_memory()
 
 
-def _begun(base: Fit, dataset: Dataset) -> Found:
-    """What is found before a search."""
-    judged = Judged(base, dataset)
-    return Found(dataset, judged, judged, (), (), (), ())
+def _on_part(found: Found) -> Found:
+    """What was found, fitted to the beginnings of the logs."""
+    on_part = replace(found.base, dataset=found.dataset.part)
+    base = refitted_on(found.base.fit.axis, on_part)
+    final = refitted_on(found.final.fit.axis, on_part) if found.steps else base
+    return replace(found, dataset=on_part.dataset, base=base, final=final)
 
 
 def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
@@ -150,14 +162,20 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
     """Go on from what was found."""
     first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
+    been: set[frozenset[tuple[type, str]]] = set()
     while len(steps) < RULE.most_steps:
-        taken = [s.change.name for s in steps]
+        made = frozenset((type(s.change), s.change.name) for s in steps)
+        if made in been:
+            break  # what one change makes needless, another asks for again
+        been.add(made)
         step = within(progress, f"step {len(steps) + 1} of at most {RULE.most_steps}")
-        judged = judged if steps else _without_delay(judged, catalogue, step)
-        judged, last, candidates = tried_beside(judged, catalogue, step, taken)
+        trial = Beside(catalogue, tuple(s.change.name for s in steps), found.barred)
+        judged = judged if steps else _without_delay(judged, trial, step)
+        judged, last, candidates = tried_beside(judged, trial, step)
         if not steps:
-            first, ranking = judged, ordered(candidates)
-        new = _accepted(judged, last) or _together(judged, last, catalogue, step)
+            doubted = (c for c in ranking if c.effect.name in found.barred)
+            first, ranking = judged, ordered([*candidates, *doubted])
+        new = _accepted(judged, last) or _together(judged, last, trial, step)
         if not new:
             break
         passed += new
@@ -173,11 +191,12 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         fit = fit_multistart(judged.fit.axis, judged.dataset, judged.fit.begun)
         dataset, fit = synchronised(fit, judged.dataset)
         judged = settled(Judged(fit, dataset))
-    found = Found(judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
-    return found if first.dataset is judged.dataset else _on_final_dataset(judged, found)
+    ended = (judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
+    found = Found(*ended, found.barred)
+    return found if first.dataset is judged.dataset else on_final_dataset(judged, found)
 
 
-def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> Judged:
+def _without_delay(judged: Judged, trial: Beside, progress: Progress) -> Judged:
     """The fit without a channel delay, where an effect of the catalogue leaves less than the delay.
 
     A friction that lags behind reversals looks like one while the model has it follow at once.
@@ -187,7 +206,7 @@ def _without_delay(judged: Judged, catalogue: Catalogue, progress: Progress) -> 
         return judged
     dataset = realigned(judged.dataset, 0.0)
     plain = Judged(replace(fit_axis(fit.axis, dataset.training), begun=fit.begun), dataset)
-    tried = tried_beside(plain, catalogue, within(progress, "no channel delay"))[1]
+    tried = tried_beside(plain, trial, within(progress, "no channel delay"))[1]
     found = [t for t in tried if t.candidate.supported and not t.judged.dataset.channel_delay]
     return plain if any(score(judged, t.judged).accepted for t in found) else judged
 
@@ -221,7 +240,7 @@ def _with_free_exponents(
     return judged, out
 
 
-def _on_final_dataset(final: Judged, found: Found) -> Found:
+def on_final_dataset(final: Judged, found: Found) -> Found:
     """What was found, on the dataset of the final fit, whose channel delay is another.
 
     So that the error without anything is one number, beside every candidate and in the answer. What
@@ -231,7 +250,7 @@ def _on_final_dataset(final: Judged, found: Found) -> Found:
 
     def there(fit: Fit) -> Judged:
         one = Judged(fit, dataset)
-        return one if fit.logs is dataset.training else refitted_on(fit.axis, one, final)
+        return one if fit.logs is dataset.training else refitted_on(fit.axis, one)
 
     first = there(found.base.fit)
 
@@ -315,7 +334,7 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
 
 
 def _together(
-    judged: Judged, tried: Sequence[Tried], catalogue: Catalogue, progress: Progress
+    judged: Judged, tried: Sequence[Tried], trial: Beside, progress: Progress
 ) -> list[Step]:
     """Two changes that are accepted together, and each beside the other; none where there are not.
 
@@ -328,8 +347,9 @@ def _together(
 
     ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
     for way in ways:
+        with_it = replace(trial, taken=(*trial.taken, way.change.name))
         beside, seconds, _ = tried_beside(
-            way.judged, catalogue, within(progress, f"beside {way.change.name}")
+            way.judged, with_it, within(progress, f"beside {way.change.name}")
         )
         if not (then := _accepted(beside, seconds)):
             continue
@@ -337,7 +357,7 @@ def _together(
         axis = way.change.undone(both.fit.axis, judged.fit.axis)
         if axis is None or score(judged, both).refused:
             continue
-        alone = refitted_on(axis, both, both)
+        alone = refitted_on(axis, both)
         if _is_needed(way.change, alone, both):
             return [Step(way, with_others=True), replace(second, with_others=True)]
     return []
@@ -369,7 +389,7 @@ def _less_replaced(
     for step in gone:
         axis = step.change.undone(axis, first.fit.axis) or axis
     if axis is not judged.fit.axis:
-        judged = refitted_on(axis, judged, judged)
+        judged = refitted_on(axis, judged)
     *kept, last = (s for s in steps if s not in gone)
     dropped = (*last.dropped, *dict.fromkeys(s.change.name for s in gone))
     return judged, (*kept, replace(last, dropped=dropped))
@@ -391,18 +411,16 @@ def _needed(
             continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
-            without = refitted_on(axis, judged, judged)
+            without = refitted_on(axis, judged)
             curve = isinstance(steps[-1].change, Reshaped) and not step.with_others
             if curve and _is_held(step.change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
-            if _is_needed(step.change, without, judged):
-                # The shapes of later effects were found beside this one; they may differ without.
-                without.fit.forget()
-                again = fit_multistart(without.fit.axis, judged.dataset, judged.fit.begun)
-                without = Judged(again, judged.dataset)
-                if _is_needed(step.change, without, judged):
-                    continue
+            needed = _is_needed(step.change, without, judged)
+            without.fit.forget()
+            without = fitted_anew(without)
+            if needed and _is_needed(step.change, without, judged):
+                continue
             judged = without
         kept = [s for s in steps if s is not step]
         dropped = (*kept[-1].dropped, step.change.name)

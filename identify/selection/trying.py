@@ -5,7 +5,7 @@ Of all changes for the search; of a single one for whoever asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -52,34 +52,46 @@ class Tried:
     candidate: Candidate
 
 
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What is tried beside a fit: a catalogue, and what of it is not.
+
+    taken: names of laws that the search added; a free curve may stand in the place of one, which is
+    then not absent. barred: names of laws of which no change is tried.
+    """
+
+    catalogue: Catalogue
+    taken: Sequence[str] = ()
+    barred: Collection[str] = ()
+
+
 def tried_beside(
-    judged: Judged,
-    catalogue: Catalogue,
-    progress: Progress = silent,
-    taken: Sequence[str] = (),
+    judged: Judged, trial: Beside, progress: Progress = silent
 ) -> tuple[Judged, list[Tried], list[Candidate]]:
     """Every change beside a fit: the fit at its best, those refitted, and all absent effects.
 
-    taken: names of laws that the search added; a free curve may stand in the place of one, or of
-    one that the model had from the beginning, which is then not absent.
+    An effect is not absent where a free curve stands in the place of it, which the search added or
+    the model had from the beginning.
 
     If the values of the best without its change are a better start for the fit, it is refitted from
     there: a fit short of its optimum would let every change in.
     """
-    known = {*taken, *judged.fit.begun.names}
-    effects = [e for e in absent_effects(judged.fit.axis, catalogue) if e.name not in known]
+    known, barred = {*trial.taken, *judged.fit.begun.names, *trial.barred}, trial.barred
+    effects = [e for e in absent_effects(judged.fit.axis, trial.catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not e.is_noise]
-    changes: list[Change] = [*plain, *freed_of(judged.fit.axis)]
+    freed = [c for c in freed_of(judged.fit.axis) if c.name not in barred]
+    changes: list[Change] = [*plain, *freed]
     if judged.at_floor:
         changes = []
-    trial = ControlTest.beside(judged)
+    controls = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")
-    screenings = spread(lambda c: c.screen(judged, trial), changes, trying)
+    screenings = spread(lambda c: c.screen(judged, controls), changes, trying)
     tried = _refitted(judged, screenings, len({e.kind for e in effects}), progress)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         progress("trying free curves", 0, 1)
-        curves = [c.screen(judged, trial) for c in reshaped_of(judged.fit, judged.dataset)]
+        shapes = [c for c in reshaped_of(judged.fit, judged.dataset) if c.name not in barred]
+        curves = [c.screen(judged, controls) for c in shapes]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
         tried += _refitted(judged, best, len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
@@ -136,7 +148,8 @@ def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1
 
     among: of how many changes it is chosen.
     """
-    change, after = screening.change, Judged(fit, judged.dataset)
+    # What was given stays that, whatever was changed since.
+    change, after = screening.change, Judged(replace(fit, begun=judged.fit.begun), judged.dataset)
     if not fit.at_floor:
         after = settled(after)
     found = candidate_of(judged, after, change.effect, parameters(change), among)
@@ -166,10 +179,21 @@ def settled(judged: Judged) -> Judged:
     return Judged(fit, moved) if fit.error < judged.fit.error else judged
 
 
-def refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
+def refitted_on(axis: AxisModel, judged: Judged) -> Judged:
     """An axis fitted to the dataset of a judged fit."""
     dataset = judged.dataset
-    return Judged(replace(fit_axis(axis, dataset.training), begun=begun.fit.begun), dataset)
+    return Judged(replace(fit_axis(axis, dataset.training), begun=judged.fit.begun), dataset)
+
+
+def fitted_anew(judged: Judged) -> Judged:
+    """The fit made again: its shapes scanned, and from the values of the model as it was given.
+
+    What it had beside and lost may have led the shapes of others, and moved the values of all.
+    """
+    axis, dataset = judged.fit.axis, judged.dataset
+    scanned = fit_multistart(axis, dataset, judged.fit.begun)
+    given = refitted_on(axis.begun_as(judged.fit.begun), judged)
+    return given if given.fit.error < scanned.error else Judged(scanned, dataset)
 
 
 def _as_screened(judged: Judged, screening: Screening) -> Candidate:
@@ -197,7 +221,7 @@ def _at_its_best(judged: Judged, tried: list[Tried]) -> tuple[Judged, list[Tried
     axis = best.change.undone(best.judged.fit.axis, judged.fit.axis)
     if axis is None or best.candidate.part > NEARLY_ALL:
         return judged, tried
-    refitted = refitted_on(axis, judged, judged)
+    refitted = refitted_on(axis, judged)
     # 0.999 of the error, below which another refit is a better optimum
     if refitted.fit.error > 0.999 * judged.fit.error:
         return judged, tried

@@ -21,7 +21,7 @@ from identify.estimation.fit import error_on
 from identify.output.as_json import json_of
 from identify.results.results import Diagnosis
 from identify.selection.diagnosis import Verdict
-from identify.workflow import add_named, diagnose
+from identify.workflow import diagnose
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
@@ -34,7 +34,7 @@ PULLED = STAGE.with_axis("x", STAGE.axes["x"].with_effect(effect("quadratic_drag
 KNOWN = Catalogue([CATALOGUE["quadratic_drag"], CATALOGUE["constant_force"]])
 TESTED = {
     "test_error_before", "test_error_after", "test_error_on", "explains", "explained",
-    "noise_floors",
+    "noise_floors", "model",
 }  # fmt: skip
 
 
@@ -81,12 +81,11 @@ def test_a_test_log_decides_nothing_and_gives_the_errors(found):
     assert finding["explains"] == pytest.approx(1.0, abs=0.05)
 
 
-def test_an_addition_tells_the_errors_on_the_logs_of_each_role(found):
-    added, dataset = add_named(found), found.axes["x"].dataset
-    step = added.step
+def test_the_model_of_a_diagnosis_tells_the_errors_on_the_logs_of_each_role(found):
+    dataset, (step,) = found.axes["x"].dataset, found.model.history
     for axis, tested, chosen in (
         (found.axes["x"].base.axis, step.test_error_before, step.holdout_error_before),
-        (added.model.axes["x"], step.test_error_after, step.holdout_error_after),
+        (found.model.axes["x"], step.test_error_after, step.holdout_error_after),
     ):
         assert tested == pytest.approx(rms(error_on(axis, dataset.test)))
         assert chosen == pytest.approx(rms(error_on(axis, dataset.selection)))
@@ -167,19 +166,21 @@ def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_f
     assert told.floor <= x.final.error, "noise is part of what is left"
     assert set(told.floors) == {Role.TRAINING, Role.SELECTION}
     assert told.floors[Role.SELECTION] <= told.chosen.after
-    assert case.diagnosis.model.axes["x"] is x.base.axis
+    assert case.diagnosis.fitted.axes["x"] is x.base.axis
     labels = {e.label for e in told.after} - {e.label for e in told.before}
     assert labels == {f"cogging.{p.name}" for p in CATALOGUE["cogging"].parameters}
     assert {m.label for m in told.moved} >= {"coulomb_viscous.Fc"}
 
 
-def test_what_a_diagnosis_names_is_added_as_it_was_fitted(case):
-    made_of_it = workflow.add_named(case.diagnosis)
-    assert made_of_it.candidate is case.x.best
-    assert made_of_it.kept
-    assert made_of_it.model.axes["x"] is case.x.best.fit.axis
-    assert made_of_it.model.history[-1] == made_of_it.step
-    assert set(made_of_it.step.notes) < set(made_of_it.notes)
-    assert workflow.add_named(case.diagnosis.__class__(
-        case.diagnosis.model, {"x": case.quiet}, case.diagnosis.comparison, {}
-    )) is None  # fmt: skip
+def test_the_model_of_a_diagnosis_has_what_was_found_as_it_was_fitted(case):
+    made_of_it = case.diagnosis.model
+    assert made_of_it.axes["x"] == case.x.final.axis
+    (step,) = made_of_it.history
+    assert (step.action, step.effect) == ("add", "cogging")
+    assert (step.fit_error_before, step.fit_error_after) == (case.x.base.error, case.x.final.error)
+    labels = {e.label for e in case.diagnosis.summaries["x"].after if e.low is not None}
+    assert made_of_it.intervals["x"].ends.keys() == labels
+    nothing = case.diagnosis.__class__(
+        case.diagnosis.fitted, {"x": case.quiet}, case.diagnosis.comparison, {}
+    )
+    assert nothing.model is case.diagnosis.fitted

@@ -246,6 +246,17 @@ class AxisModel:
     def __getitem__(self, effect: str) -> Fitted:
         return next(f for f in self.effects if f.effect.name == effect)
 
+    def begun_as(self, other: AxisModel) -> AxisModel:
+        """The same effects, with the mass and the values that another axis has for those of both."""
+
+        def begun(law: Fitted) -> Fitted:
+            name = law.effect.name
+            values = other[name].values if name in other.names else law.values
+            # Another number of elements is another law.
+            return replace(law, values=values) if values.keys() == law.values.keys() else law
+
+        return replace(self, mass=other.mass, effects=tuple(map(begun, self.effects)))
+
     @property
     def weighed(self) -> AxisModel:
         """The same with what effects add to the moved mass in the mass, and without these."""
@@ -362,9 +373,9 @@ class MachineModel:
         """This stage with the intervals of one axis."""
         return replace(self, intervals={**self.intervals, name: found})
 
-    def with_history(self, step: HistoryStep) -> MachineModel:
-        """This stage with one more step of history."""
-        return replace(self, history=(*self.history, step))
+    def with_history(self, *steps: HistoryStep) -> MachineModel:
+        """This machine with more steps of history."""
+        return replace(self, history=(*self.history, *steps))
 
     def table(self) -> Table:
         """The native table of all axes."""

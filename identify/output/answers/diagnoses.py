@@ -26,14 +26,15 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
-from identify.results.results import Addition, CorrectedBody, Diagnosis
+from identify.results.results import Addition, AllAdded, CorrectedBody, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.findings import FindingKind
+from identify.selection.findings import Confirmation, FindingKind
 from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
 from twin.experiments.file import parameters
 from twin.experiments.kinds import kind_of
+from twin.model.file import format_model
 from twin.model.machine import MachineModel
 
 # --- planned experiments ---------------------------------------------------------------------
@@ -152,6 +153,36 @@ def _values(c: Candidate) -> dict[str, Any]:
     return {"parameters": axis[name].values, "parameter_units": axis.parameter_units(name)}
 
 
+class StepErrorsEntry(Entry):
+    """A law that was added or changed, and the RMS errors without and with all that was."""
+
+    action: str
+    effect: str
+    axis: str
+    unit: str
+    fit_error_before: Number
+    fit_error_after: Number
+    holdout_error_before: Number
+    holdout_error_after: Number
+    test_error_before: Number
+    test_error_after: Number
+
+
+class AllAddedAnswer(Answer):
+    """What `twin add --found` prints: the laws that were added together."""
+
+    steps: list[StepErrorsEntry]
+    kept: bool
+    """Whether the logs prefer the model with all of them on every axis that it changed."""
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: AllAdded, **more: Any) -> AllAddedAnswer:
+    steps = [StepErrorsEntry.of(step) for step in result.steps]
+    return AllAddedAnswer.of(result, steps=steps, **more)
+
+
 class CandidateEntry(ValuesEntry):
     """An effect that was tried beside the model."""
 
@@ -240,7 +271,7 @@ class FindingEntry(Entry):
     """Effects without which the logs do not prove it."""
     bend: BendEntry | None
     indistinguishable_from: list[str] = read("tied")
-    contradicted_by_test_logs: bool = read("contradicted")
+    state: Confirmation
     test_error_before: Number = read("tested.before")
     test_error_after: Number = read("tested.after")
     test_error_on: Role = read("tested.on")
@@ -406,6 +437,10 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
     axes: dict[str, DiagnosisEntry]
     body: BodyEntry | None
     """Of a mechanism, what is told of its bodies; the axes are told with it as it was found."""
+    model: str
+    """The model with everything that was found, as the text of its TOML file."""
+    mujoco: str | None
+    """Of a mechanism with another body, the text of the MJCF file of that model."""
     data_faults: list[str] = Field([])
     """What the check of the logs found."""
     left_out: list[str] = Field([])
@@ -414,9 +449,11 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 @answer_of.register
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
-    body = result.body and BodyEntry.of(result.body, **_of_body(result.body, result.model))
-    leading = axes[result.leading.dataset.axis]
-    return DiagnosisAnswer.of(leading, axes=axes, body=body, **more)
+    body = result.body and BodyEntry.of(result.body, **_of_body(result.body, result.fitted))
+    leading, model = axes[result.leading.dataset.axis], result.model
+    mujoco = model.mjcf if body else None
+    written = {"model": format_model(model), "mujoco": mujoco}
+    return DiagnosisAnswer.of(leading, axes=axes, body=body, **written, **more)
 
 
 def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:
@@ -460,5 +497,4 @@ class DemoAnswer(Answer):
     named: bool
     report: File
     diagnosis: DiagnosisAnswer
-    addition: AdditionAnswer | None
     feedforward: FeedforwardAnswer | None

@@ -30,7 +30,7 @@ def cards(view: AxisView) -> list[Block]:
 def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> AnswerBlock:
     """The card of a body whose inertia is not that of its file."""
     sentence, *others = body_in_words(diagnosis, source)
-    axes = diagnosis.model.axes
+    axes = diagnosis.fitted.axes
     tiles = [
         Tile(
             axes[a].units.words(f"Force error, {a}"),
@@ -62,7 +62,7 @@ def _diagnosed(
         tiles=_tiles(view, found, summary),
         remarks=[capitalised(text) for text in remarks if text],
         tone=Tone.PLAIN if quiet else Tone.STRONG,
-        commands=[view.subject.command(text) for text in said.commands],
+        commands=view.subject.still_to_do(said.commands),
     )
 
 

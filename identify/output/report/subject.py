@@ -52,6 +52,10 @@ class Subject:
                 named[role] += names
         return {role: list(dict.fromkeys(names)) for role, names in named.items()}
 
+    def still_to_do(self, commands: Sequence[str]) -> list[str]:
+        """Commands with the model and the logs of the page, less what was done."""
+        return self.source.still_to_do(commands, self.logs)
+
     def command(self, text: str) -> str:
         """A command with the model and the logs of this page in the place of MODEL and LOG..."""
         return self.source.filled(text, self.logs)

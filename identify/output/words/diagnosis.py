@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,8 +38,7 @@ from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import Finding, FindingKind
-from twin.effects import load_catalogue
+from identify.selection.findings import Confirmation, Finding, FindingKind
 from twin.model.units import units_of
 
 
@@ -60,7 +58,7 @@ def finding_in_words(finding: Finding) -> tuple[str, ...]:
         law = f", in {' '.join(finding.equation.split())}" if finding.equation else ""
         said.append(f"Found: {values}{law}")
     if finding.confidence is None:
-        said.append("No confidence is stated, as the test logs do not confirm it")
+        said.append("No confidence is stated, as the test logs contradict it")
     else:
         right = f"{percent(finding.confidence)} of answers as well supported as this were right"
         said.append(f"{right}, on machines whose missing effect is known")
@@ -83,10 +81,13 @@ def _explained(finding: Finding) -> str:
         if finding.bend:
             with_it, without = (f"with {value}" for value in _exponents_in_words(finding.bend))
             what = f"{finding.effect} has another shape, which its law {with_it} has: that"
-    share = percent(finding.explains)
-    how = f"explains {share} of the squared error above the noise floor"
-    if finding.contradicted:
-        how = "is not confirmed by the test logs"
+    how = {
+        Confirmation.CONTRADICTED: "is contradicted by the test logs",
+        Confirmation.UNTESTED: "is not tested by the test logs, whose error hardly changes",
+    }.get(finding.state)
+    if how is None or tested.on is not Role.TEST:
+        share = percent(finding.explains)
+        how = f"explains {share} of the squared error above the noise floor"
     return f"{what} {how}: {without} the {error} is {before}, {with_it} {after}"
 
 
@@ -112,8 +113,8 @@ def pairs_in_words(found: AxisDiagnosis) -> list[str]:
     """Of named effects that need each other, that they do."""
     names = [f.effect for f in found.findings]
     return [
-        f"{first} and {second} are needed together, so the logs prove neither alone: add both and "
-        "judge after the second (the first twin add ends with exit code 1)"
+        f"{first} and {second} are needed together, so the logs prove neither alone: the model "
+        "that --model writes has both"
         for i, first in enumerate(names)
         for second in found.findings[i].together
         if second in names[i + 1 :]
@@ -166,21 +167,9 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
 
 def advice(findings: Sequence[Finding] = ()) -> str:
     """What lowers the error where no physical effect explains it, or a law has the wrong shape."""
-    catalogue = load_catalogue()
-    for f in findings:
-        resembles = f.kind is FindingKind.RESEMBLES
-        if f.bend is not None:
-            held = [p.name for p in catalogue[f.effect].parameters if p.fixed]
-            fixed = json.dumps([name for name in held if name != f.bend.parameter])
-            first = f"after `twin add {f.effect}`, " if resembles else ""
-            return (
-                f"{first}fixed = {fixed} for {f.effect} in the model file lets `twin fit` find its "
-                f"{f.bend.parameter}, which gives the model the shape that the logs show"
-            )
-        if f.shape is not None:
-            first = f"twin add {f.effect}, then " if resembles else ""
-            shaped = f"{first}twin add --shape {f.effect}"
-            return f"{shaped} gives the model the shape that the logs show"
+    shaped = [f.effect for f in findings if f.shape is not None]
+    if shaped:
+        return f"the model that --model writes has {listed(shaped)} in the shape that the logs show"
     curves = " or ".join(fitted_curves())
     return f"twin add {curves} lowers the error by fitted curves, without explaining it"
 
@@ -231,7 +220,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     return Said(
         headline=f"{corrected}{headline_in_words(found)}",
         verdict=verdict,
-        findings=tuple(finding_in_words(f) for f in found.findings),
+        findings=tuple(finding_in_words(f) for f in (*found.findings, *found.contradicted)),
         beside=tuple(beside),
         shapes=tuple(shape_in_words(f.effect, f.shape) for f in found.findings if f.shape),
         left=tuple(left),
@@ -268,7 +257,13 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
     if reshaped := _reshaped(found):
         said.append(f"The law of {listed(reshaped)} has another shape too.")
     said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
-    said += [capitalised(against)] if (against := not_confirmed_in_words(found)) else []
+    if against := [f.effect for f in found.contradicted]:
+        ask = "The training logs ask" if not found.dataset.selection else "The logs that chose ask"
+        more = " too" if found.findings else ""
+        said.append(
+            f"{ask} for {listed(against)}{more}, but the test logs contradict "
+            f"{'them' if against[1:] else 'it'}: their error rises, so the model is without."
+        )
     return " ".join(said)
 
 
@@ -317,14 +312,8 @@ def headline_in_words(found: AxisDiagnosis) -> str:
             answer = "something outside the catalogue is missing"
         case Verdict.NOTHING_MISSING:
             answer = "nothing is missing"
-    against = not_confirmed_in_words(found)
-    return spaced(f"{answer} ({against})" if against else answer)
-
-
-def not_confirmed_in_words(found: AxisDiagnosis) -> str | None:
-    """Which findings the test logs contradict; None where they contradict none."""
-    against = [f.effect for f in found.findings if f.contradicted]
-    return f"not confirmed by the test logs: {', '.join(against)}" if against else None
+    against = ", ".join(f.effect for f in found.contradicted)
+    return spaced(f"{answer} (contradicted by the test logs: {against})" if against else answer)
 
 
 def named_in_words(found: AxisDiagnosis) -> str:
@@ -398,10 +387,21 @@ def not_named_in_words(found: AxisDiagnosis, index: int) -> str | None:
     name = found.steps[index].change.name
     if name in [f.effect for f in found.findings]:
         return None
+    if name in [f.effect for f in found.contradicted]:
+        return "contradicted by the test logs"
+    if leader := _level_with(name, found):
+        return f"level with {leader}"
+    if name in found.doubted:
+        return f"at the end, {found.doubted[name]}"
     for step in found.steps[index:]:
         if name in step.dropped:
             return f"no longer needed beside {model_change_in_words(step.change)}"
     return "no longer needed beside what was found after it"
+
+
+def _level_with(name: str, found: AxisDiagnosis) -> str | None:
+    """The finding that an effect is as good as beside all else; None where there is none."""
+    return next((f.effect for f in found.findings if name in f.tied), None)
 
 
 def why_not(found: AxisDiagnosis, candidate: Candidate) -> str:
@@ -411,8 +411,11 @@ def why_not(found: AxisDiagnosis, candidate: Candidate) -> str:
         beside = found.named and not any(name in answer for answer in found.answers)
         return f"not needed beside {listed(found.named)}" if beside else ""
     pairs = (f.together[0] for f in found.findings if f.effect == name and f.together)
-    other = next(pairs, None)
-    return f"proved only together with {other}" if other else candidate.refused or ""
+    if other := next(pairs, None):
+        return f"proved only together with {other}"
+    if leader := _level_with(name, found):
+        return f"level with {leader} beside all that was found"
+    return candidate.refused or ""
 
 
 # --- notes beside the answer ------------------------------------------------------------------

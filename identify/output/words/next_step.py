@@ -26,7 +26,8 @@ from twin.experiments.kinds import kind_of
 from twin.model.machine import HistoryStep, MachineModel
 from twin.mujoco.written import inertial
 
-OPTIONS = {Role.TRAINING: "", Role.SELECTION: "--holdout ", Role.TEST: "--test "}
+OPTIONS = {Role.TRAINING: (), Role.SELECTION: ("--holdout",), Role.TEST: ("--test",)}
+WRITE = "twin diagnose MODEL LOG... --model better.toml"  # the model with all that was found
 Names = Mapping[Role, Sequence[str]]
 
 
@@ -34,31 +35,39 @@ Names = Mapping[Role, Sequence[str]]
 class Source:
     """What a result was made of: the command as typed, the model's name in it, the logs' folder.
 
-    options: those of the command that the next one needs as well.
+    options: those of the command that the next one needs as well. written: the file of the model
+    with all that was found, where it was written.
     """
 
     command: str = ""
     model: str = "MODEL"
     folder: Path = Path()
-    options: str = ""
+    options: tuple[str, ...] = ()
+    written: str | None = None
 
     def filled(self, text: str, names: Names) -> str:
         """A command with this model and these logs in the place of MODEL and LOG...
 
-        A plan reads no test logs. What is written has another name than the model.
+        A plan reads no test logs. The last word, what is written, has another name than the model.
         """
         given = [
-            f"{OPTIONS[role]}{shlex.quote(name)}"
+            word
             for role, logs in names.items()
             for name in logs
             if role is not Role.TEST or not text.startswith("twin plan")
+            for word in (*OPTIONS[role], name)
         ]
-        every = " ".join([*given, *([self.options] if self.options else [])])
-        begun, _, written = text.rpartition("-o ")
-        if again := re.fullmatch(rf"{Path(written).stem}(?:_(\d+))?", Path(self.model).stem):
-            name = f"{Path(written).stem}_{int(again[1] or 1) + 1}{Path(written).suffix}"
-            text = f"{begun}-o {name}"
-        return text.replace("LOG...", every).replace("MODEL", shlex.quote(self.model))
+        places = {"LOG...": [*given, *self.options], "MODEL": [self.model]}
+        *words, last = text.split()
+        written = Path(last)
+        if again := re.fullmatch(rf"{written.stem}(?:_(\d+))?", Path(self.model).stem):
+            last = f"{written.stem}_{int(again[1] or 1) + 1}{written.suffix}"
+        return shlex.join([*(w for word in words for w in places.get(word, [word])), last])
+
+    def still_to_do(self, commands: Sequence[str], names: Names) -> list[str]:
+        """The commands, filled, less the one that writes what is written already."""
+        done = [WRITE] if self.written else []
+        return [self.filled(text, names) for text in commands if text not in done]
 
 
 UNKNOWN = Source()
@@ -79,21 +88,25 @@ def next_commands(found: AxisDiagnosis) -> list[str]:
     """What to run next, of MODEL and LOG...: of what is named first, else of what is left."""
     if found.verdict is Verdict.NOTHING_MISSING:
         return []
-    for finding in found.missing:
-        if finding.tied:
-            pair = f"{finding.effect} {finding.tied[0]}"
-            return [f"twin plan MODEL LOG... --between {pair} -o next.toml"]
-        if finding.together:
-            second = f"twin add {finding.together[0]} first.toml LOG... -o both.toml"
-            return [f"twin add {finding.effect} MODEL LOG... -o first.toml", second]
-    first = next((f for f in found.findings if not f.contradicted), None)
-    if first is None:
-        added = fitted_curves()[0] if found.unexplained else None
-    elif first in found.missing:
-        added = first.effect
-    else:  # of a free exponent the model file has to be changed
-        added = None if first.bend else f"--shape {first.effect}"
-    return [f"twin add {added} MODEL LOG... -o better.toml"] if added else []
+    if not found.findings:
+        curve = fitted_curves()[0]
+        return [f"twin add {curve} MODEL LOG... -o better.toml"] if found.unexplained else []
+    plans = [
+        f"twin plan MODEL LOG... --axis {found.dataset.axis} --between {finding.effect} "
+        f"{finding.tied[0]} -o next.toml"
+        for finding in found.missing
+        if finding.tied
+    ]
+    return [*plans[:1], WRITE]
+
+
+def model_in_words(result: Diagnosis) -> str:
+    """What the model is that a diagnosis writes."""
+    named = [finding.effect for found in result.axes.values() for finding in found.findings]
+    body = [f"body {result.body.body}"] if result.body and result.body.element else []
+    if not (named or body):
+        return "the fitted model, as nothing was found"
+    return f"the model with {listed([*body, *dict.fromkeys(named)])}, fitted together"
 
 
 # --- planned experiments --------------------------------------------------------------------------
@@ -268,7 +281,7 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
     found = result.body
     if found is None:
         return []
-    said, file = wrong_body_in_words(found, result.model), result.model.mjcf_name
+    said, file = wrong_body_in_words(found, result.fitted), result.fitted.mjcf_name
     if found.element is None:
         return [*said, f"Next: change the body in {file}, then fit again."]
     command = f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"

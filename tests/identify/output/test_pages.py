@@ -134,10 +134,11 @@ def undecided() -> Diagnosis:
 
 
 def contradicted() -> Diagnosis:
-    """The only effect that is named is not confirmed by the test logs."""
+    """The only effect that the logs ask for is contradicted by the test logs."""
     against, _ = made.errors(2.17, 2.29, Role.TEST)
     finding = replace(ONE, tested=against)
-    found = made.diagnosed(made.diagnosis_of(findings=(finding,)))
+    x = made.diagnosis_of(Verdict.UNEXPLAINED)
+    found = made.diagnosed(replace(x, contradicted=(finding,)))
     x = replace(found.summaries["x"], tested=against)
     return replace(found, summaries={**found.summaries, "x": x})
 

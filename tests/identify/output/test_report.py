@@ -83,7 +83,7 @@ def test_every_section_is_there(page: str) -> None:
 
 
 def test_what_feedforward_gains_is_known_where_something_was_found(case: Case) -> None:
-    before, after = case.diagnosis.model, case.diagnosis.final_model
+    before, after = case.diagnosis.fitted, case.diagnosis.model
     worth = on_machine(after, case.held, before).worth
     assert worth is not None
     assert worth.axes["x"].gains["cogging"] > 0.0

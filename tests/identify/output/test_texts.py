@@ -75,7 +75,8 @@ def with_test_logs():
     """With test logs, which contradict one finding."""
     against = replace(ALONE, tested=made.errors(2.17, 2.29, Role.TEST)[0])
     dataset = replace(made.DATASET, test=made.DATASET.selection)
-    return of(made.diagnosis_of(on=Role.TEST, dataset=dataset, findings=(against, LUGRE)))
+    found = made.diagnosis_of(on=Role.TEST, dataset=dataset, findings=(LUGRE,))
+    return of(replace(found, contradicted=(against,)))
 
 
 def trained():

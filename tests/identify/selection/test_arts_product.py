@@ -93,7 +93,7 @@ def test_a_friction_that_yields_is_named_and_explains_what_it_can(model, logs, t
     assert set(answer.answers[0]) <= HYSTERETIC
     assert not found.comparison.axes["x"].position_error
 
-    added = add(CATALOGUE["dahl"], found.model, *logs, test_function=test_function)
+    added = add(CATALOGUE["dahl"], found.fitted, *logs, test_function=test_function)
     assert added.kept
     dataset = answer.dataset
     start = np.array([np.log(1e4), np.log(2e6), 0.0, 0.0])

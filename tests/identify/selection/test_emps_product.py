@@ -55,11 +55,11 @@ def found(model, emps):
 
 @pytest.fixture(scope="module")
 def added(found, emps):
-    return add(CATALOGUE["asymmetric_friction"], found.model, *emps, test_function=WINDOW)
+    return add(CATALOGUE["asymmetric_friction"], found.fitted, *emps, test_function=WINDOW)
 
 
 def test_the_four_parameter_fit_is_near_the_published_one(found):
-    axis = found.model.axes["x"]
+    axis = found.fitted.axes["x"]
     assert axis.mass == pytest.approx(95.1089, rel=0.015)
     assert axis["coulomb_viscous"].values["sigma2"] == pytest.approx(203.5034, rel=0.015)
     assert axis["coulomb_viscous"].values["Fc"] == pytest.approx(20.3935, rel=0.015)

@@ -18,9 +18,9 @@ from identify.estimation.found_shape import found_shape
 from identify.estimation.free_curves import shapes_of
 from identify.output.as_json import json_of
 from identify.output.words.diagnosis import finding_in_words, verdict_in_words
-from identify.output.words.next_step import next_commands
+from identify.output.words.next_step import WRITE, next_commands
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
-from identify.selection.findings import FindingKind
+from identify.selection.findings import Confirmation, FindingKind
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -246,20 +246,23 @@ PITCHES = (0.0113, 0.0171, 0.0079, 0.0253, 0.0061)  # m
 # 6. Effects that raise the test error.
 
 
-def test_what_test_logs_contradict_is_told_as_not_confirmed() -> None:
+def test_what_test_logs_contradict_is_told_and_not_in_the_model() -> None:
     true = having(SLIDE, "cogging", p=0.021, a1=0.03, b1=0.02)
     logs = {"one": logged(true, Ride(1))}, {"held": logged(true, Ride(2))}
     rivals = few("cogging", "spring")
     for machine, confirmed in ((SLIDE, False), (true, True)):
         found = diagnose_axis(*begun(SLIDE, *logs, {"test": logged(machine, Ride(3))}), rivals)
-        (finding,) = found.findings
+        (finding,) = found.findings if confirmed else found.contradicted
         assert finding.effect == "cogging"
         assert (finding.tested.after < finding.tested.before) is confirmed
-        assert finding.contradicted is not confirmed
+        assert finding.state is (Confirmation.CONFIRMED if confirmed else Confirmation.CONTRADICTED)
         assert (finding.confidence is not None) is confirmed
         told = (verdict_in_words(found), " ".join(finding_in_words(finding)))
-        assert all(("ot confirmed by the test logs" in text) is not confirmed for text in told)
-        assert any("add cogging" in one for one in next_commands(found)) is confirmed
+        assert all(("contradict" in text) is not confirmed for text in told)
+        assert (WRITE in next_commands(found)) is confirmed
+        assert (found.named, found.final.axis.names[-1:]) == (
+            (("cogging",), ("cogging",)) if confirmed else ((), found.base.axis.names[-1:])
+        )
         assert ("were right" in told[1]) is confirmed
 
 

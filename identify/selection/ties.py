@@ -1,0 +1,114 @@
+"""Ties: changes that explain the logs as well as one that was found, beside all else that was.
+
+When a search compared an early change with its rivals, the later ones were still missing. So they
+are compared again at its end: every one that was level with it, and of a friction or a resonance
+all others of the catalogue, whatever their own fits ended in. A rival is one that was fitted in its
+place, whose values can be its own there, and that takes a part of what is left without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from identify.estimation.fit import fit_axis, fit_roughly
+from identify.rules import RULE
+from identify.selection.acceptance import Judged
+from identify.selection.candidates import candidate_of
+from identify.selection.changes import Added, Screening
+from identify.selection.search import Found, Step, is_tied, simplest
+from identify.selection.trying import Tried, fitted_anew, parameters, refitted_on
+from twin.effect import Kind
+from twin.model.machine import AxisModel, Fitted
+
+ALIKE = (Kind.FRICTION, Kind.STRUCTURE)  # whose values of one name mean the same in each
+
+
+def with_ties(found: Found) -> Found:
+    """What a search found, with the rivals of each change as they are beside all that was found.
+
+    Where the logs ask for a rival rather than for what was found, it takes its place.
+    """
+    for step in found.steps:
+        if step.tied or _others_alike(step, found):
+            found = _compared_again(step, found)
+    return found
+
+
+def _compared_again(step: Step, found: Found) -> Found:
+    final = found.final
+    axis = step.change.undone(final.fit.axis, found.base.fit.axis)
+    if axis is None:
+        return _with_step(found, step, replace(step, tied=()), final)
+    without, own = refitted_on(axis, final), replace(step.tried, judged=final)
+    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
+    fitted = (_in_its_place(t, own, without, found) for t in rivals.values())
+    tied = [t for t in fitted if t is not None]
+    # Another shape of a law was fitted beside what the search had then, and cannot lead.
+    leader = simplest([own, *(t for t in tied if isinstance(t.change, Added))])
+    others = tuple(t for t in (own, *tied) if t is not leader)
+    if leader is own:
+        return _with_step(found, step, replace(step, tied=others), final)
+    leading = replace(leader, judged=fitted_anew(leader.judged))
+    return _with_step(found, step, replace(step, tried=leading, tied=others), leading.judged)
+
+
+def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:
+    steps = tuple(new if s is old else s for s in found.steps)
+    return replace(found, steps=steps, final=final)
+
+
+def _in_its_place(rival: Tried, own: Tried, without: Judged, found: Found) -> Tried | None:
+    """A rival fitted in the place of what was found; None where it is none."""
+    if rival.change.name in {s.change.name for s in found.steps}:
+        return None
+    if not isinstance(rival.change, Added):
+        return rival  # another shape of a law, which was fitted beside what the search had
+    for law in _values_of(rival, own):
+        fitted = _level(without.fit.axis.with_effect(law), rival, own, without)
+        if fitted is not None:
+            return fitted
+    return None
+
+
+def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
+    """The values to fit a rival from: its own, if it was refitted, and those of what was found."""
+    law = rival.judged.fit.axis[rival.change.name]
+    if rival.candidate.score:
+        yield law
+    if law.effect.kind in ALIKE:  # whose values were those of another model
+        yield _as_free_as(own.judged.fit.axis[own.change.name], law)
+
+
+def _level(axis: AxisModel, rival: Tried, own: Tried, without: Judged) -> Tried | None:
+    """A rival that is level with what was found, as this axis begins its fit; None if it is not."""
+    dataset, effect = without.dataset, rival.change.effect
+    rough = fit_roughly(axis, dataset.training)  # a better fit is no less level
+    for fit in (lambda: rough, lambda: fit_axis(rough.axis, dataset.training)):
+        judged = Judged(replace(fit(), begun=without.fit.begun), dataset)
+        if is_tied(replace(rival, judged=judged), own):
+            candidate = candidate_of(without, judged, effect, parameters(rival.change))
+            if not candidate.doubt and candidate.part >= RULE.least_part:
+                return replace(rival, judged=judged, candidate=candidate)
+    return None
+
+
+def _others_alike(step: Step, found: Found) -> list[Tried]:
+    """All others of the catalogue, where a friction or a resonance was added."""
+    kind = step.change.effect.kind
+    if not isinstance(step.change, Added) or kind not in ALIKE:
+        return []
+    own = {p.name for p in step.change.effect.parameters if not p.strength}
+    others = (c for c in found.ranking if c.effect.kind is kind and not c.doubt)
+    rivals = [c for c in others if own & {p.name for p in c.effect.parameters}]
+    changes = [Added(c.effect) for c in rivals]
+    return [
+        Tried(change, Screening(change, 0.0), Judged(c.fit, found.dataset), c)
+        for change, c in zip(changes, rivals, strict=True)
+    ]
+
+
+def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
+    """A law with the values of another, and as free, where both have a parameter of that name."""
+    free = {n: v for n, v in other.values.items() if n in law.values and n not in other.fixed}
+    return replace(law, values={**law.values, **free}, fixed=law.fixed.difference(free))
