@@ -330,7 +330,7 @@ def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch
     assert done.returncode == 0, done.stderr
     assert (slide / out).is_file()
     text = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, folder=slide).stdout
-    source = () if name != "diagnose" else (Source(model="m.toml", options=shlex.join(TYPED)),)
+    source = () if name != "diagnose" else (Source(model="m.toml", options=TYPED),)
     assert text.startswith(getattr(as_text, f"{name}_text")(found, *source))
     if name in ("fit", "add"):
         again = load_model(slide / out, load_catalogue())

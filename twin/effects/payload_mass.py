@@ -21,8 +21,9 @@ EFFECT = Effect(
     equation="(1 + ratio) m a = F",
     source="Newton's second law",
     parameters=(
+        # A nominal mass may be any number of times too large: what moves is more than nothing.
         Parameter(
-            "ratio", "1", 0.0, -0.5, 10.0, "payload over the nominal moved mass", strength=True
+            "ratio", "1", 0.0, -0.99, 10.0, "payload over the nominal moved mass", strength=True
         ),
     ),
     law=law,

@@ -103,7 +103,7 @@ def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
     assert hashlib.sha256((tmp_path / "run 1").read_bytes()).hexdigest() in text
     assert "run 2, sha256given in memory, not as a file" in text
     assert "Commandtwin diagnose drive.toml 'run 1'" in text
-    assert "twin add cogging drive.toml 'run 1'" in text
+    assert re.search(r"Nexttwin diagnose drive.toml 'run 1'.* --model better.toml", text)
     assert re.search(r"Model, sha256[0-9a-f]{64}", text)
     save_model(case.model, tmp_path / "drive.toml")
     text = Outline(case.write(tmp_path / "r.html", source=source)).text
