@@ -137,7 +137,7 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
     after = before if found.final is found.base else estimates(0.0)
     floors = {Role.TRAINING: 2.03, Role.SELECTION: 2.17} if found.dataset.selection else {}
     floors = {Role.TRAINING: 2.03, **floors}
-    return AxisSummary(before, after, (), found.tested, found.chosen, floors, 1.0)
+    return AxisSummary(before, after, (), found.tested, found.chosen, floors)
 
 
 STRUCTURE = Dependence(

@@ -25,7 +25,7 @@ import numpy as np
 from identify.dataset.drive import knows_rounding
 from identify.dataset.motion import Motion
 from identify.dataset.noise import Noise, noises_of
-from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.readings import rate_gain, white_rounding
 from identify.dataset.spectrum import median_spectrum
 from identify.dataset.test_function import TestFunction
@@ -50,6 +50,16 @@ class NoiseFloor:
     low: float
     high: float
     parts: Mapping[str, float]
+
+    @property
+    def known(self) -> float:
+        """What is known to make noise, N RMS: all of it but the force that no sensor makes.
+
+        That force is what a fit left and nothing measured predicts, and so no floor to set an error
+        against.
+        """
+        unknown = self.parts.get("force", 0.0)
+        return self.value if not unknown else float(np.sqrt(max(self.value**2 - unknown**2, 0.0)))
 
     @property
     def follows_motion(self) -> bool:
@@ -86,6 +96,14 @@ def noise_beside(
         less = _of_parts(axis, logs, rooms)
         floor = replace(less, high=floor.high) if less.value < floor.value else floor
     return floor.at_most(error)
+
+
+def known_floor(axis: AxisModel, logs: Sequence[PreparedLog], left: Array) -> float:
+    """What is known to make noise in the force residual of these logs, N RMS.
+
+    left (n,): N, what the axis leaves, zero where it says nothing; noise is part of it.
+    """
+    return noise_beside(axis, logs, split_by_log(left, logs)).known
 
 
 def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:

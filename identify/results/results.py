@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from identify.dataset.dataset import Dataset, Role, by_log
-from identify.dataset.noise_floor import NoiseFloor, floor_of
+from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
 from identify.estimation.fit import Errors, Fit, error_if_any, error_in
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
@@ -17,7 +19,7 @@ from identify.experiment_design.plan import Plan
 from identify.links import WrongBody, corrected
 from identify.results import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import left_on
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -145,9 +147,9 @@ class AxisSummary:
     before, after: estimates without and with what was found. moved: parameters that what was found
     changed. tested, chosen: errors without and with it on the test logs and on those that chose.
     floors: noise floor of the final model on the logs of each role, N RMS, the only one that is
-    told: never more than what the model leaves there, as noise is part of that. selection_ratio:
-    error of the model without what was found on the selection logs over their noise floor; None
-    where there are none. noise: the floor on the training logs with its parts.
+    told: of what is known to make noise, and never more than what the model leaves there. beyond:
+    by role, error of the final model on logs that were not fitted, over all noise that they may
+    have. noise: the floor on the training logs with its parts.
     """
 
     before: tuple[Estimate, ...]
@@ -156,7 +158,7 @@ class AxisSummary:
     tested: Errors
     chosen: Errors
     floors: Mapping[Role, float]
-    selection_ratio: float | None = None
+    beyond: Mapping[Role, float] = field(default_factory=dict)
     noise: NoiseFloor | None = None
 
     @property
@@ -168,11 +170,12 @@ class AxisSummary:
 def summary_of(found: AxisDiagnosis) -> AxisSummary:
     """The summary of a diagnosis."""
     base, final, dataset = found.base, found.final, found.dataset
-    floors = {Role.TRAINING: final.floor}
+    floors, beyond = {Role.TRAINING: final.noise.known}, dict[Role, float]()
     for role in (Role.SELECTION, Role.TEST):
         if logs := dataset.having(role):
-            floors[role] = min(floor_of(final.axis, logs), error_in(role, final, dataset))
-    judged, before = Judged(base, dataset), estimates(base)
+            floors[role] = known_floor(final.axis, logs, np.nan_to_num(left_on(final, logs)))
+            beyond[role] = error_in(role, final, dataset) / floor_of(final.axis, logs)
+    before = estimates(base)
     return AxisSummary(
         before=before,
         after=before if final is base else estimates(final),
@@ -180,7 +183,7 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
         tested=found.tested,
         chosen=found.chosen,
         floors=floors,
-        selection_ratio=judged.other_error / judged.other_floor if dataset.selection else None,
+        beyond=beyond,
         noise=final.noise,
     )
 

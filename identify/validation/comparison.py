@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset, by_log
-from identify.dataset.noise_floor import noise_beside
+from identify.dataset.noise_floor import known_floor
 from identify.dataset.prepared_log import (
     PreparedLog,
     moving,
     on_blocks,
-    split_by_log,
     sticks,
     total_force,
 )
@@ -103,7 +102,7 @@ def compare_axis(
     every = residual(axis, logs)
     force = every[kept]
     if floor is None:
-        floor = noise_beside(axis, logs, split_by_log(np.where(kept, every, 0.0), logs)).value
+        floor = known_floor(axis, logs, np.where(kept, every, 0.0))
     where = {k: v[kept] for k, v in coordinates(axis, logs).items()}
     maps = [*misfit_maps(axis, logs, floor, force, where), misfit_by_frequency(axis, logs)]
     return AxisComparison(

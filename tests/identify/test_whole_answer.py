@@ -1,4 +1,4 @@
-"""The final model is the answer: nothing stands in it without a name, and the user gets it whole."""
+"""The final model is the answer: nothing is in it without a name, and the user gets all of it."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class FitEntry(Entry):
     converged: bool
     at_bound: list[str]
     force_error: Number = read("error")
-    noise_floor: Number = read("floor")
+    noise_floor: Number = read("noise.known")
     holdout_force_error: Number
     test_force_error: Number
     unit: str = read("axis.units.force")

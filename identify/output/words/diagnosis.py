@@ -254,6 +254,13 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
             "noise of another size, or something that only they excite. Record a selection log "
             "like them."
         ]
+    elif found.verdict is Verdict.NOTHING_MISSING and found.dataset.force_noise:
+        times = found.final.error / found.final.noise.known
+        said = [
+            "Nothing that is missing shows. The force error is "
+            f"{times:.1f} times what is known to make noise: nothing that was measured predicts "
+            "what is left, and its origin is not known."
+        ]
     if reshaped := _reshaped(found):
         said.append(f"The law of {listed(reshaped)} has another shape too.")
     said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
@@ -462,11 +469,14 @@ def _about_the_fits(found: AxisDiagnosis, summary: AxisSummary) -> list[str]:
 
 
 def _beyond_in_words(summary: AxisSummary, error: str) -> list[str]:
-    """That the selection logs show what the training logs do not; nothing where they do not."""
-    ratio = summary.selection_ratio
-    if ratio is None or ratio < RULE.at_floor:
+    """That other logs show what the training logs do not; nothing where they do not."""
+    above = {role: ratio for role, ratio in summary.beyond.items() if ratio > RULE.at_floor}
+    if not above:
         return []
+    times = (
+        f"{x:.1f} times what noise makes on the {role.value} logs" for role, x in above.items()
+    )
     return [
-        f"This holds for the training logs alone: on the selection logs the {error} is {ratio:.1f} "
-        "times its noise floor. Give such a log as a training log too."
+        f"This holds for the training logs alone: the {error} is {' and '.join(times)}. Give such "
+        "a log as a training log too."
     ]

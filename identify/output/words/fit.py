@@ -77,7 +77,7 @@ def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
     scale = DisplayUnit.of(unit, fit.error)
     errors = (f"on the {role.value} logs {scale.text(e)}" for role, e in known.items())
-    floor = over_floor(unit, fit.floor, fit.error)
+    floor = over_floor(unit, fit.noise.known, fit.error)
     yield f"axis {axis}: {words('force error')} {', '.join(errors)}, {floor}"
     yield words(OUTCOMES[fit.ended])
     yield from (f"at its bound: {label}" for label in fit.at_bound)
@@ -192,8 +192,9 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
     said = [words(delay)] if (delay := channel_delay_in_words(dataset)) else []
     if own := dataset.force_noise:
         said.append(
-            f"the noise floor includes {quantity(own, dataset.units.force)} of {words('force')} "
-            "noise that no sensor explains: of the drive or of its surroundings"
+            f"{quantity(own, dataset.units.force)} of {words('force')} is left that nothing "
+            "measured predicts and no sensor makes. Its origin is not known: it counts as noise, "
+            "of the drive or of its surroundings"
         )
     said += [
         f"{log}: the first {quantity(end, 's')} are left out, as their {words('force')} fits "

@@ -224,7 +224,7 @@ def test_noise_is_part_of_the_floor_and_said():
     known = noise_known(PLAIN, data)
     assert known.force_noise == pytest.approx(np.sqrt(fit.error**2 - fit.floor**2))
     assert fit_to(known).ratio == pytest.approx(1.0)
-    assert "force noise that no sensor explains" in prepared_in_words(known)[0]
+    assert "Its origin is not known" in prepared_in_words(known)[0]
     assert fit_to(known.with_force_noise(0.0)).floor == pytest.approx(fit.floor)
     assert all(log.force_noise == known.force_noise for log in known.logs)
 

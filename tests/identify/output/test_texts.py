@@ -107,7 +107,7 @@ def shaped(kind: FindingKind, **more: object):
 def beyond():
     """Nothing missing of the training logs, while the selection logs show something."""
     result = made.diagnosed()
-    summaries = {"y": replace(result.summaries["y"], selection_ratio=3.0)}
+    summaries = {"y": replace(result.summaries["y"], beyond={Role.SELECTION: 3.0, Role.TEST: 1.1})}
     quiet = {"axes": {"y": result.axes["y"]}, "refits": {"y": Refit(1.0, 1.0, ())}}
     return replace(result, summaries=summaries, **quiet)
 

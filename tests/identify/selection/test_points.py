@@ -156,7 +156,7 @@ def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     found = identify.diagnose(model, {"one": one, "two": two}, {"held": held})
     assert found.axes["x"].verdict is Verdict.NOTHING_MISSING
     assert found.axes["x"].dataset.force_noise > 0.02
-    assert "force noise that no sensor explains" in str(found)
+    assert "its origin is not known" in str(found)
     assert json_of(found)["axes"]["x"]["verdict"] == "nothing_missing"
 
 
