@@ -65,8 +65,7 @@ def concluded(
         ended = _explained(found)
         if weakest := _weakest(ended, found):
             name, found = weakest.effect, without_law(weakest.effect, found)
-            why = weakest.refused or "its band holds the law everywhere"
-            doubts[name] = Doubt(why, _laws(found), again=name in doubts)
+            doubts[name] = Doubt(_why(weakest), _laws(found), again=name in doubts)
         asked = {n for n, d in doubts.items() if not d.again and d.beside != _laws(found)}
         if not weakest and not asked:
             told = {name: doubt.why for name, doubt in doubts.items() if name not in _laws(found)}
@@ -119,15 +118,27 @@ def _weakest(ended: Conclusion, found: Found) -> Finding | None:
     return None if any(f.refused for f in rest.findings) else weakest
 
 
+def _why(weakest: Finding) -> str:
+    return weakest.refused or "its band holds the law everywhere"
+
+
 def _refused(ended: Conclusion, found: Found) -> Conclusion:
-    """The conclusion without what the test logs contradict, what they contradict most first."""
+    """The conclusion without what the test logs contradict, what they contradict most first.
+
+    And without what is not proved any more where it is gone.
+    """
     against = [f for f in ended.findings if f.state is Confirmation.CONTRADICTED]
     if not against:
         return ended
     worst = max(against, key=lambda f: f.tested.after / f.tested.before)
-    found = without_law(worst.effect, found)
-    rest = replace(_explained(found), doubted=ended.doubted)
-    return _refused(replace(rest, contradicted=(*ended.contradicted, worst)), found)
+    found, doubted = without_law(worst.effect, found), dict(ended.doubted)
+    rest = _explained(found)
+    while weakest := _weakest(rest, found):
+        doubted[weakest.effect] = _why(weakest)
+        found = without_law(weakest.effect, found)
+        rest = _explained(found)
+    told = replace(rest, doubted=doubted, contradicted=(*ended.contradicted, worst))
+    return _refused(told, found)
 
 
 def _with_own_noise(found: Found) -> Found:
