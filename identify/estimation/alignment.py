@@ -56,11 +56,14 @@ def _shifted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
         if again.error > RULE.fallen * fit.error:
             break
         dataset, fit = moved, again
-    if dataset.channel_delay:  # to its best value, be the last step too small to tell a delay by
+    while dataset.channel_delay:  # to its best value, by steps that are too small to tell a delay
         last, _, _ = _linear_shift(fit, dataset)
         moved = realigned(dataset, max(dataset.channel_delay + last, 0.0))
         again = replace(fit_axis(fit.axis, moved.training), begun=fit.begun)
-        dataset, fit = (moved, again) if again.error < fit.error else (dataset, fit)
+        # 0.999 of the error, below which another fit is a better optimum
+        if again.error > 0.999 * fit.error:
+            break
+        dataset, fit = moved, again
     return dataset, fit
 
 
@@ -128,6 +131,8 @@ def moved_by(fit: Fit, dataset: Dataset) -> Dataset | None:
 def realigned(dataset: Dataset, shift: float) -> Dataset:
     """The dataset with a channel delay of ``shift`` (s) removed, counted from the original logs."""
     more = shift - dataset.channel_delay
+    if more == 0.0:
+        return dataset
     moved = dataset.with_logs(
         replace(
             PreparedLog.of(w.motion.with_force_ahead(more), w.test_function.length, w.reach),

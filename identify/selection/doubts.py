@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.alignment import fit_aligned
+from identify.estimation.alignment import fit_aligned, realigned
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished
 from identify.estimation.residual_noise import with_own_noise
@@ -79,12 +79,15 @@ def _at_its_best(found: Found) -> Found:
     """What was found, its final fit where whoever fits that model anew ends.
 
     Its channel delay and its time origins were found on the way, and its shapes beside other laws.
+    Who fits it anew begins without the delay, and finds one that moves the values once more.
     """
     if not found.steps:
         return found
-    final = found.final
-    dataset, fit = fit_aligned(final.fit.axis, found.dataset)
-    if not fit.error < BETTER * final.fit.error:
+    final, dataset, fit = found.final, found.dataset, found.final.fit
+    for _ in range(2 if dataset.channel_delay else 1):
+        dataset, fit = fit_aligned(fit.axis, realigned(dataset, 0.0))
+    least = 1.0 / BETTER if found.dataset.channel_delay else BETTER
+    if not fit.error < least * final.fit.error:
         return found
     better = Judged(replace(fit, begun=final.fit.begun), dataset)
     return on_final_dataset(better, replace(found, dataset=dataset, final=better))
