@@ -120,7 +120,7 @@ class Judged:
     def training(self) -> Array:
         """Residual (n,) N of the training logs; not a number where it tells nothing."""
         out = np.full(len(self.fit.kept), np.nan)
-        out[self.fit.kept] = self.fit.residual / self.fit.lessened
+        out[self.fit.kept] = self.fit.residual
         return out
 
     @cached_property
@@ -130,11 +130,10 @@ class Judged:
         if not logs:
             columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
             rows = self._smoothing
-            left = left_out(fit.residual, columns, rows.T @ rows)
-            out[fit.kept] = left / fit.lessened
+            out[fit.kept] = left_out(fit.residual, columns, rows.T @ rows)
             return out
         kept = moving(logs, sticks(fit.axis))
-        return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
+        return np.where(kept, residual(fit.axis, logs), np.nan)
 
     def tell(self) -> None:
         """Compute what a score asks for, and let go of the matrices that it takes."""

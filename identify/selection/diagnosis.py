@@ -212,9 +212,12 @@ def _compared_again(step: Step, found: Found) -> Step:
 
 
 def _is_tied_with(axis: AxisModel, rival: Tried, own: Tried, dataset: Dataset) -> bool:
-    """Whether a rival is level with what was found, as this axis begins its fit."""
+    """Whether a rival that is itself is level with what was found, as this axis begins its fit."""
+    effect = rival.change.effect
 
     def is_tied_by(fit: Fit) -> bool:
+        if effect.imitation(fit.axis[effect.name].values, dataset.excitation):
+            return False
         return is_tied(replace(rival, judged=Judged(fit, dataset)), own)
 
     rough = fit_roughly(axis, dataset.training)  # a better fit is no less level

@@ -20,7 +20,7 @@ from enum import Enum
 
 from identify.dataset.dataset import Dataset, Role
 from identify.estimation.evidence import BETTER
-from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
+from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
@@ -169,7 +169,7 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
     if len(steps) == len(found.steps):
         return found.base
     dataset = found.dataset
-    fits = [fit_axis(a, dataset.part.training) for a in (axis, *_alike(axis, found.passed))]
+    fits = [fit_themselves(a, dataset.part.training) for a in (axis, *_alike(axis, found.passed))]
     less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
     if dataset.part is not dataset:
         less = finished(less.axis, less.begun, dataset.training, less.outcome)

@@ -17,7 +17,7 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import begun_at, realigned, synchronised, time_origins
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.fit import Fit, error_on, fit_axis, turned
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
@@ -400,6 +400,8 @@ def _needed(
                 # The shapes of later effects were found beside this one; they may differ without.
                 without.fit.forget()
                 again = fit_multistart(without.fit.axis, judged.dataset, judged.fit.begun)
+                if turned(without.fit.axis, again.axis, again.logs):
+                    continue
                 without = Judged(again, judged.dataset)
                 if _is_needed(step.change, without, judged):
                     continue

@@ -12,7 +12,7 @@ from functools import partial
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import knows_rounding
 from identify.estimation.alignment import moved_by
-from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
 from identify.estimation.free_curves import shapes_of
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
@@ -169,7 +169,7 @@ def settled(judged: Judged) -> Judged:
 def refitted_on(axis: AxisModel, begun: Judged, judged: Judged) -> Judged:
     """An axis fitted to the dataset of a judged fit."""
     dataset = judged.dataset
-    return Judged(replace(fit_axis(axis, dataset.training), begun=begun.fit.begun), dataset)
+    return Judged(replace(fit_themselves(axis, dataset.training), begun=begun.fit.begun), dataset)
 
 
 def _as_screened(judged: Judged, screening: Screening) -> Candidate:
