@@ -157,6 +157,19 @@ def sums_of_parts(p, first, count, ratio):
     return shares, springs
 
 
+def _mean_yield(values: Mapping[str, float]) -> float:
+    """Deflection at which elements slip that carry Fc together, m, on average of their forces."""
+    count = int(values["elements"])
+    steps = range(1, count + 1)
+    shares, stiff = ([values[f"{part}_{i}"] for i in steps] for part in ("share", "stiff"))
+    taper = values["spread"] ** (-1.0 / max(count - 1, 1))
+    springs = [own * taper**i for i, own in enumerate(stiff)]
+    parts = sum(share**2 / spring for share, spring in zip(shares, springs, strict=True))
+    return values["Fc"] / values["sigma0"] * parts * sum(springs) / sum(shares) ** 2
+
+
+ELEMENTS_SLIP = slips_after(_mean_yield)
+
 LAYERS = (
     Parameter(
         "reach", "m", 5e-3, LEAST, MOST, "travel from no force until every layer slips",

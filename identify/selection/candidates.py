@@ -26,9 +26,9 @@ from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
-from twin.effect import Effect, Kind
+from twin.effect import Effect, Excitation, Kind
 from twin.knee import Imitation
-from twin.model.machine import AxisModel
+from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]
 
@@ -125,9 +125,9 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     """
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
-        if imitation := effect.imitation(fitted.values, dataset.excitation):
-            return _told_as(imitation, fit.axis)
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
+        if imitation := _imitation(fitted, ended, dataset.excitation):
+            return _told_as(imitation, fit.axis)
         if ended:
             return f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound"
         alone = replace(fit.axis, effects=(fitted,))
@@ -138,9 +138,19 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
             return "a tenth more or less of what the bodies of the file weigh could be it"
         if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
             return "it takes the place of the friction, which another friction would"
-        if _is_the_inertia(alone, before, fit):
-            return "it takes the place of the inertia"
+    if _has_lost_inertia(before.fit, fit):
+        return "it takes the place of the inertia"
     return None
+
+
+def _imitation(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:
+    """What a law is where it is not itself; ended: labels of what a fit held where it still is."""
+    effect, values = fitted.effect, fitted.values
+    names = [label.split(".")[-1] for label in ended]
+    by_more = 1e-6  # of a value that ended: past the edge of what shows it
+    past = [{**values, n: values[n] * (1.0 + way * by_more)} for n in names for way in (-1, 1)]
+    found = (effect.imitation(each, covered) for each in (values, *past))
+    return next((one for one in found if one), None)
 
 
 def _told_as(imitation: Imitation, axis: AxisModel) -> str:
@@ -148,7 +158,8 @@ def _told_as(imitation: Imitation, axis: AxisModel) -> str:
     knee, unit = imitation.knee, axis.units(imitation.knee.unit)
     size, edge = (f"{v:.3g} {unit}" for v in (imitation.size, imitation.edge))
     side = "below" if imitation.size < imitation.edge else "beyond"
-    return f"its {knee.name} of {size} is {side} {edge}, so that it is {imitation.of.value} here"
+    value = "" if size == edge else f" of {size}"
+    return f"its {knee.name}{value} is {side} {edge}, so that it is {imitation.of.value} here"
 
 
 def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
@@ -196,18 +207,19 @@ def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
     return float(now @ now) < RULE.collapse**2 * least and _is_of(was - now, own[:, None])
 
 
-def _is_the_inertia(alone: AxisModel, before: Judged, fit: Fit) -> bool:
-    """Whether a force is most of the inertia's that has collapsed beside it.
+def _has_lost_inertia(base: Fit, fit: Fit) -> bool:
+    """Whether the mass has collapsed that a base told.
 
-    In a motion that repeats in time a sine in time can hold it. Below what the fit began with too:
-    the mass of the base may be wrong for want of this effect. Where no motion told it, what is
-    gained by the effect is not what the mass has lost.
+    In a motion that repeats in time a sine in time can hold its force. Below what the base began
+    with too, as its mass may be wrong for want of this effect. Where what only the mass explains is
+    less than what the base leaves, no motion told it, and it had taken the place of another.
     """
-    mass, least = fit.axis.mass, min(before.fit.axis.mass, before.fit.begun.mass)
-    if not mass < RULE.collapse * least:
+    if not fit.axis.mass < RULE.collapse * min(base.axis.mass, base.begun.mass):
         return False
-    acceleration = np.concatenate([log.acceleration for log in before.dataset.training])
-    return _is_of(acceleration, averaged_force(alone, before.dataset.training)[:, None])
+    is_mass = np.array([not c.effect for c in base.scaling.where])
+    others = orthonormal(base.jacobian[:, ~is_mass])
+    inertia = unabsorbed(base.axis.mass * base.jacobian[:, is_mass].sum(axis=1), others)
+    return float(inertia @ inertia) > float(base.residual @ base.residual)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:
