@@ -22,7 +22,7 @@ from identify import workflow
 from identify.estimation.variable_projection import absent_effects
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.selection import diagnosis
+from identify.selection import doubts
 from identify.selection.trying import try_effect
 from twin.core.compiled import law_address
 from twin.effects import load_catalogue
@@ -34,8 +34,8 @@ STAGES: tuple[tuple[str, ModuleType, str], ...] = (
     ("prepare", workflow, "datasets"),
     ("fit", workflow, "fit_aligned"),
     ("intervals", workflow, "estimates"),
-    ("search", diagnosis, "search"),
-    ("what each finding explains", diagnosis, "findings_of"),
+    ("search", doubts, "search"),
+    ("what each finding explains", doubts, "findings_of"),
     ("next experiment", workflow, "next_experiments"),
     ("comparison and free run", workflow, "_compared"),
 )

@@ -26,6 +26,7 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import Columns, PreparedLog, sticks
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Errors, Fit, fit_axis
+from identify.estimation.force_balance import residual
 from identify.estimation.intervals import half_widths_by
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
@@ -36,7 +37,7 @@ from identify.selection.findings import confidence
 from identify.selection.trying import NEARLY_ALL
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, silent
 from twin.signals import Array
 
@@ -155,7 +156,7 @@ def suspects_of(
     if not left:
         return Suspects()
     bodies = [_Body(mechanism, mechanism.axes.index(axis)) for axis in left]
-    rivals: list[_Body | _Motor] = [*bodies, *map(_Motor, left)]
+    rivals: list[_Body | _Motor] = [*bodies, *(_Motor(a, before[a].fit.axis) for a in left)]
     trial = _Trial.beside(before)
     parts = []
     for i, rival in enumerate(rivals):
@@ -166,7 +167,7 @@ def suspects_of(
     if max(parts) < RULE.promise * RULE.least_part:
         return Suspects()
     if isinstance(first, _Motor):
-        is_less = trial.part(_Constant(first.axis)) > max(parts)
+        is_less = trial.part(_Constant(first.axis, first.model)) > max(parts)
         return Suspects(motor=None if is_less else first.axis)
     next_body = [rival for rival in others if isinstance(rival, _Body)][:1]
     return Suspects(_accepted(first, next_body, len(rivals), trial, fits, datasets))
@@ -257,16 +258,22 @@ class _Rival(Protocol):
 
 @dataclass(frozen=True)
 class _Motor:
-    """The torque constant of an axis."""
+    """The torque constant of an axis, beside what its model was fitted to.
+
+    What it makes of an error in the torque as it was logged is in proportion to the torque that the
+    model tells; the measured one would explain itself.
+    """
 
     axis: str
+    model: AxisModel
 
     def forget(self) -> None:
         pass
 
     def forces(self, log: PreparedLog) -> Array:
-        own = log.motion.axis == self.axis
-        return log.fine.mean(log.motion.raw[1])[:, None] * float(own)
+        if log.motion.axis != self.axis:
+            return np.zeros((len(log), 1))
+        return (log.fine.mean(log.motion.raw[1]) - residual(self.model, [log]))[:, None]
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,6 @@ def built_fit(
     kept: NDArray[np.bool_] | None = None,
     logs: Sequence[PreparedLog] = (),
     jacobian: Array | None = None,
-    lessened: float = 1.0,
     outcome: Outcome = Outcome.CONVERGED,
     begun: AxisModel | None = None,
 ) -> Fit:
@@ -74,7 +73,7 @@ def built_fit(
     kept = np.ones(len(residual), dtype=bool) if kept is None else kept
     scaling = Scaling(free_parameters(axis))
     fit = Fit(axis, logs, scaling, outcome, residual, kept, begun or axis)
-    fit.__dict__.update(noise=known_floor(floor), lessened=lessened, at_bound=())
+    fit.__dict__.update(noise=known_floor(floor), gain=1.0, at_bound=())
     if jacobian is not None:
         fit.__dict__["jacobian"] = jacobian
     return fit

@@ -15,7 +15,8 @@ FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is Kind.FRICTION)
 LOG = Excitation(
     position_low=-0.13, position_high=0.21, speed_max=0.37, dry_level=0.83, duration=47.0,
     period=2.5e-4, force_max=11.0, repeats=Repeating((53.0, 17.0)), ripples=(3.1e-5, 1.7e-5),
-    resolution=2.3e-7, other_joints=(1.0, 2.0),
+    resolution=2.3e-7, other_joints=(1.0, 2.0), force_usual=2.9, speed_least=3.7e-4,
+    shortest=1.1e-7,
 )  # fmt: skip
 
 

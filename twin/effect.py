@@ -28,6 +28,7 @@ from typing import Any
 
 from twin.curve import Curve, FreeShape, Part
 from twin.excitation import Excitation as Excitation  # effects' files take it from here
+from twin.knee import Imitation, Knee
 
 # Slots of ``io``. Compiled laws freeze these numbers.
 INDEX = 0  # sample index, 0 at the first sample
@@ -184,9 +185,9 @@ class Effect:
     """Whether an axis may have the effect more than once, as cogging of poles and of slots."""
     number: int = 1
     """Which of several it is."""
-    is_itself: Callable[[Mapping[str, float], Excitation], bool] | None = None
-    """(values by name, the motion covered) -> whether the law with these values is the effect, and
-    not some other force that it imitates; None: always."""
+    knees: tuple[Knee, ...] = ()
+    """What makes the law itself; where the motion does not pass each of them, it is another law. A
+    law that is linear in all that is free has none: it is always itself."""
     dead_time: bool = False
     """Whether it only delays the force against the reading. Which of the two is late, no log of
     both can tell."""
@@ -261,6 +262,11 @@ class Effect:
     def is_present(self, values: Mapping[str, float]) -> bool:
         """Whether any strength of the effect is not zero."""
         return any(values[p.name] != 0.0 for p in self.strengths)
+
+    def imitation(self, values: Mapping[str, float], covered: Excitation) -> Imitation | None:
+        """What other law it is with these values on that motion; None where it is itself."""
+        told = (knee.imitation(values, covered) for knee in self.knees)
+        return next((found for found in told if found), None)
 
     @cached_property
     def _names(self) -> frozenset[str]:

@@ -57,6 +57,16 @@ class Excitation:
     """Lowest and highest position of the logs, m; the ends of the travel where None."""
     other_joints: tuple[float, ...] = ()
     """Numbers of a mechanism's other joints, in the order of its axes; none of a plain axis."""
+    force_usual: float = 0.5
+    """Median of the command's size while the axis moves, N."""
+    speed_least: float = 0.0
+    """Speed below which the axis may as well be at rest, m/s."""
+    shortest: float = 0.0
+    """Least change of position that the readings tell from their rounding and noise, m."""
+    longest: float | None = None
+    """Duration of the longest log, s; of all of them where None."""
+    fewest_cycles: float = 1.0
+    """Cycles that have to be seen of what is said to repeat."""
 
     @property
     def lines(self) -> tuple[float, ...]:
@@ -83,6 +93,22 @@ class Excitation:
     def travel(self) -> float:
         """Distance covered, m."""
         return self.position_high - self.position_low
+
+    @property
+    def stroke(self) -> float:
+        """Time that the travel takes at the highest speed, s."""
+        return self.travel / self.speed_max
+
+    @property
+    def longest_period(self) -> float:
+        """Period along the track of which enough cycles were seen, m."""
+        low, high = self.been
+        return (high - low) / self.fewest_cycles
+
+    @property
+    def frequencies(self) -> tuple[float, float]:
+        """Lowest and highest frequency that a log shows, Hz."""
+        return self.fewest_cycles / (self.longest or self.duration), 0.5 / self.period
 
     @property
     def been(self) -> tuple[float, float]:

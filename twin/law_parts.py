@@ -26,6 +26,58 @@ from twin.effect import (
     Parameter,
     V,
 )
+from twin.knee import Imitated, Knee
+
+# --- what makes a law itself ----------------------------------------------------------------------
+
+COUNTS = 3.0  # of the readings; a period of one or two is their rounding, in whatever harmonic
+
+
+def at(
+    parameter: str,
+    unit: str,
+    shown: Callable[[Excitation], tuple[float, float]],
+    below: Imitated | None = None,
+    above: Imitated | None = None,
+) -> Knee:
+    """The knee that a parameter is."""
+    return Knee(parameter, unit, lambda v, e: v[parameter], lambda v, e: shown(e), below, above)
+
+
+def repeats_after(period: str, else_: Imitated = Imitated.OF_POSITION) -> Knee:
+    """A period along the track of which the motion has some cycles, and the readings some steps."""
+    return at(
+        period, "m", lambda e: (COUNTS * e.resolution, e.longest_period),
+        Imitated.ROUNDING, else_,
+    )  # fmt: skip
+
+
+def slips_after(size: Callable[[Mapping[str, float]], float]) -> Knee:
+    """A reach until what sticks slips; from a reversal on it is twice as long."""
+    return Knee(
+        "reach", "m", lambda v, e: size(v),
+        lambda v, e: (e.shortest, 0.5 * (e.been[1] - e.been[0])),
+        Imitated.DRY_FRICTION, Imitated.SPRING,
+    )  # fmt: skip
+
+
+DEFLECTION = slips_after(lambda v: v["Fc"] / v["sigma0"])
+
+
+def swings_at(frequency: str, below: Imitated, above: Imitated | None) -> Knee:
+    """A frequency that the logs show."""
+    return at(frequency, "Hz", lambda e: e.frequencies, below, above)
+
+
+def late_by(time: str, as_: Imitated) -> Knee:
+    """A delay within a stroke; a short one is little, and nothing else."""
+    return at(time, "s", lambda e: (0.0, e.stroke), above=as_)
+
+
+def bends_at(speed: str, as_: Imitated) -> Knee:
+    """A speed between rest and the highest."""
+    return at(speed, "m/s", lambda e: (e.speed_least, e.speed_max), as_, as_)
+
 
 # --- friction -------------------------------------------------------------------------------------
 
@@ -105,6 +157,19 @@ def sums_of_parts(p, first, count, ratio):
     return shares, springs
 
 
+def _mean_yield(values: Mapping[str, float]) -> float:
+    """Deflection at which elements slip that carry Fc together, m, on average of their forces."""
+    count = int(values["elements"])
+    steps = range(1, count + 1)
+    shares, stiff = ([values[f"{part}_{i}"] for i in steps] for part in ("share", "stiff"))
+    taper = values["spread"] ** (-1.0 / max(count - 1, 1))
+    springs = [own * taper**i for i, own in enumerate(stiff)]
+    parts = sum(share**2 / spring for share, spring in zip(shares, springs, strict=True))
+    return values["Fc"] / values["sigma0"] * parts * sum(springs) / sum(shares) ** 2
+
+
+ELEMENTS_SLIP = slips_after(_mean_yield)
+
 LAYERS = (
     Parameter(
         "reach", "m", 5e-3, LEAST, MOST, "travel from no force until every layer slips",
@@ -118,6 +183,16 @@ LAYERS = (
         for i in range(4)
     ),
 )  # fmt: skip
+
+
+def _mean_reach(values: Mapping[str, float]) -> float:
+    """Of the layers, m, each by its force; that of the first where none has any."""
+    forces = [values[f"f{i}"] for i in range(4)]
+    parts = sum(force / 2**i for i, force in enumerate(forces))
+    return values["reach"] * (parts / sum(forces) if any(forces) else 1.0)
+
+
+LAYERS_SLIP = slips_after(_mean_reach)
 
 
 def slipping_layers(p, s, io):

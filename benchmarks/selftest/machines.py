@@ -356,7 +356,7 @@ def _with_planted(
         else:
             held = trial
         reached = visible_force(fitted, held.base, trial.dataset)
-        own = effect.is_itself is None or effect.is_itself(fitted.values, trial.dataset.excitation)
+        own = effect.imitation(fitted.values, trial.dataset.excitation) is None
         told = hidden_part(fitted, held.base, trial.dataset) < OWN
         if own and told and reached >= REACHED * strength * trial.floor:
             break

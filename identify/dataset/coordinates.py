@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from identify.dataset.dataset import ENOUGH
-from identify.dataset.motion import Motion
+from identify.dataset.motion import REST_SPEED, Motion
 from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.readings import FEWEST_CYCLES
 from identify.dataset.spectrum import Record, find_lines, lines_in_time
+from identify.rules import RULE
 from twin.effect import Excitation
 from twin.excitation import Repeating
 from twin.signals import Array
@@ -67,19 +70,32 @@ def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
     """What the motions of one axis cover together; ``travel`` (m) of the axis where it is known."""
+    heard = [m.head(ENOUGH / len(motions)) for m in motions]  # what repeats does so in them too
+    return replace(
+        covered(tuple(motions), travel),
+        repeats=Repeating(lines(heard)),
+        ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
+    )
+
+
+@lru_cache(maxsize=4)  # every fit of an axis with a knee asks for that of its logs
+def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = None) -> Excitation:
+    """The same but for what repeats, which takes a while to find."""
     position = np.concatenate(
         [m.position for m in motions] + ([np.array(travel)] if travel else [])
     )
     velocity = np.concatenate([m.velocity for m in motions])
     command = np.concatenate([m.net for m in motions])
-    fast = 0.02 * np.abs(velocity).max()
+    speed = np.abs(velocity)
+    fast = 0.02 * speed.max()
     ahead, behind = command[velocity > fast], command[velocity < -fast]
     if len(ahead) and len(behind):
         gap = np.median(ahead) - np.median(behind)
     else:
         gap = 2.0 * np.median(np.abs(command))
-    heard = [m.head(ENOUGH / len(motions)) for m in motions]  # what repeats does so in them too
-    force = float(max(np.abs(m.command).max() for m in motions))
+    driven = np.abs(np.concatenate([m.command for m in motions]))
+    force, slow = float(driven.max()), REST_SPEED * float(speed.max())
+    lasting = [len(m.time) * m.period for m in motions]
     return Excitation(
         position_low=float(position.min()),
         position_high=float(position.max()),
@@ -87,16 +103,24 @@ def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) ->
             min(float(m.position.min()) for m in motions),
             max(float(m.position.max()) for m in motions),
         ),
-        speed_max=float(np.abs(velocity).max()),
+        speed_max=float(speed.max()),
+        speed_least=slow,
         dry_level=float(max(abs(gap) / 2.0, np.sqrt(np.finfo(float).eps) * force)),
-        duration=float(sum(len(m.time) * m.period for m in motions)),
+        duration=float(sum(lasting)),
+        longest=float(max(lasting)),
         period=motions[0].period,
         force_max=force,
-        repeats=Repeating(lines(heard)),
-        ripples=(*motions[0].ripples, *ripples(heard)),  # the readings of all logs tell the same
+        force_usual=float(np.median(driven[speed >= slow])),
         resolution=max(m.resolution for m in motions),
+        shortest=max(_told(m) for m in motions),
+        fewest_cycles=RULE.fewest_cycles,
         other_joints=_other_joints(motions[0]),
     )
+
+
+def _told(motion: Motion) -> float:
+    """Least change of position, m rms, that readings tell from their rounding and their noise."""
+    return float(max(motion.resolution / np.sqrt(12.0), motion.position_noise))
 
 
 def _other_joints(motion: Motion) -> tuple[float, ...]:

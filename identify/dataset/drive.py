@@ -50,19 +50,10 @@ def _behind_command(actuation: _Valued, motion: Motion) -> Array:
     return motion.raw[1] + _added(actuation.axis, motion, fine, motion.sample_period)
 
 
-def forces_lessened(axis: AxisModel, motions: Sequence[Motion]) -> float:
-    """RMS force of the motor over the RMS command, where that is less than half; else 1.
-
-    At least 1e-6, so that one can divide by it. Of means over blocks, which tell it well enough.
-    """
+def added_on_blocks(axis: AxisModel, motion: Motion) -> Array:
+    """Force (n,) N that the axis' actuation effects add to the command, of means over blocks."""
     part = parts_of(axis, Kind.ACTUATION)
-    if not part.effects:
-        return 1.0
-    asked = np.concatenate([m.command for m in motions])
-    given = asked + np.concatenate([_added(part, m, m.signals, m.period) for m in motions])
-    ratio = np.linalg.norm(given) / max(np.linalg.norm(asked), np.finfo(float).tiny)
-    # 0.5 of the commanded force; below it errors are divided by actual over commanded
-    return 1.0 if ratio >= 0.5 else max(float(ratio), 1e-6)
+    return _added(part, motion, motion.signals, motion.period)
 
 
 def _added(actuation: AxisModel, motion: Motion, signals: Array, period: float) -> Array:

@@ -112,8 +112,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     plain = max(reading, white_rounding(motion.resolution, dt))
     # times the reading's noise where the band begins; above it the force's noise shows
     most = max(force, 3.0 * plain * float(bend[band][0]))
-    if force < most:
-        force = motion.command_noise
+    if force < most:  # by as much as the motor makes of its command
+        made, asked = (np.mean(u**2) for u in (actual_force(axis, motion), motion.raw[1]))
+        force = motion.command_noise * float(made / asked if asked else 1.0)
     more, scatter = _folded(motion, frequency[band], power[band], half[band], bend[band])
     # 2 bins that hold the slow motion; a dip leaves a quarter of what is folded, rounding a 20th
     if float((power / half)[2 : np.flatnonzero(band)[0]].min(initial=np.inf)) < 0.1 * more:

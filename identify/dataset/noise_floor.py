@@ -25,7 +25,13 @@ import numpy as np
 from identify.dataset.drive import knows_rounding
 from identify.dataset.motion import Motion
 from identify.dataset.noise import Noise, noises_of
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import (
+    PreparedLog,
+    motor_gain,
+    moving,
+    split_by_log,
+    sticks,
+)
 from identify.dataset.readings import rate_gain, white_rounding
 from identify.dataset.spectrum import median_spectrum
 from identify.dataset.test_function import TestFunction
@@ -87,13 +93,14 @@ def noise_beside(
     that the log does not hold, or impacts within a play. It is then reduced to what the spectrum of
     the residual allows; the upper end of the range stays.
     """
-    noises = noises_of(axis, [log.motion for log in logs])
-    floor = _of_parts(axis, logs, noises)
+    noises, gain = noises_of(axis, [log.motion for log in logs]), motor_gain(axis, logs)
+    floor = _of_parts(axis, logs, noises, gain)
     told = np.concatenate([np.zeros(0), *(r[r != 0.0] for r in left)])
     error = float(np.sqrt(np.mean(told**2))) if len(told) else np.inf
     if error < floor.low:
-        rooms = [_within_room(*each) for each in zip(left, noises, logs, strict=True)]
-        less = _of_parts(axis, logs, rooms)
+        made = (gain * own for own in left)
+        rooms = [_within_room(*each) for each in zip(made, noises, logs, strict=True)]
+        less = _of_parts(axis, logs, rooms, gain)
         floor = replace(less, high=floor.high) if less.value < floor.value else floor
     return floor.at_most(error)
 
@@ -132,16 +139,18 @@ def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     return axis.weighed.mass * _together(parts, motions)
 
 
-def _of_parts(axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noise]) -> NoiseFloor:
-    """The floor of logs with these noises."""
+def _of_parts(
+    axis: AxisModel, logs: Sequence[PreparedLog], noises: Sequence[Noise], gain: float
+) -> NoiseFloor:
+    """The floor of logs with these noises of the motor's force; gain: of that over the command."""
     motions = [log.motion for log in logs]
 
     def size(each: Sequence[Noise]) -> float:
         pairs = zip(each, logs, strict=True)
-        return _together([n.passed(w.motion, w.test_function) for n, w in pairs], motions)
+        return _together([n.passed(w.motion, w.test_function) for n, w in pairs], motions) / gain
 
     sensors = [_unrounded(n, m) for n, m in zip(noises, motions, strict=True)]
-    rounds, told = rounding_in(axis, logs), knows_rounding(axis, motions)
+    rounds, told = rounding_in(axis, logs) / gain, knows_rounding(axis, motions)
     parts = {
         "sensors": size([replace(n, folded=0.0) for n in sensors]),
         "rounding": rounds if told else 0.0,

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.drive import parts_of
+from identify.dataset.drive import added_on_blocks, parts_of
 from identify.dataset.motion import REST_SPEED, Motion
 from identify.dataset.test_function import TestFunction
 from twin.core.native import Table
@@ -123,6 +123,22 @@ def scale_of(logs: Sequence[PreparedLog]) -> Scale:
     forces, reaches, speeds = zip(*(log.extent for log in logs), strict=True)
     travel = (max(high for _, high in reaches) - min(low for low, _ in reaches)) or 1.0
     return Scale(max(forces) or 1.0, travel, travel / (max(speeds) or 1.0))
+
+
+def motor_gain(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """RMS force that an axis' motor makes of the commands of some logs, over that of the commands.
+
+    Both averaged by test functions. An error is told in the force as it was logged: what is left of
+    the motor's force, over this. So a law that weakens the motor, and all other forces with it,
+    explains nothing. Never 0, so that one can divide by it.
+    """
+    if not any(f.effect.kind is Kind.ACTUATION for f in axis.effects):
+        return 1.0
+    asked = [log.test_function.mean(log.motion.command) for log in logs]
+    given = (log.test_function.mean(added_on_blocks(axis, log.motion)) for log in logs)
+    made = [u + added for u, added in zip(asked, given, strict=True)]
+    gain = np.linalg.norm(np.concatenate(made)) / (np.linalg.norm(np.concatenate(asked)) or 1.0)
+    return max(float(gain), float(np.finfo(float).eps))
 
 
 def split_by_log(values: NDArray[Any], logs: Sequence[PreparedLog]) -> list[NDArray[Any]]:

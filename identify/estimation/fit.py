@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import covered
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.drive import forces_lessened
 from identify.dataset.noise_floor import NoiseFloor, noise_beside
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import PreparedLog, motor_gain, moving, split_by_log, sticks
 from identify.dataset.spectrum import lines_in_time
 from identify.estimation.evidence import SURE, effective_samples, rms
 from identify.estimation.force_balance import jacobian, residual
@@ -44,8 +44,9 @@ class Outcome(Enum):
 class Fit:
     """A fitted axis.
 
-    residual (n,): N at the end, of the test functions that carry information (kept). begun: the
-    axis as it was given; in a search it has nothing of what was changed since.
+    residual (n,): N at the end, in the force as it was logged, of the test functions that carry
+    information (kept). begun: the axis as it was given; in a search it has nothing of what was
+    changed since.
     """
 
     axis: AxisModel
@@ -87,9 +88,9 @@ class Fit:
         return effective_samples(self.residual)
 
     @cached_property
-    def lessened(self) -> float:
-        """RMS force of the motor over the RMS command, where that is less than half; else 1."""
-        return forces_lessened(self.axis, [log.motion for log in self.logs])
+    def gain(self) -> float:
+        """RMS force of the motor over the RMS command; a force over it is as it was logged."""
+        return motor_gain(self.axis, self.logs)
 
     @cached_property
     def jacobian(self) -> Array:
@@ -198,6 +199,39 @@ def fit_axis(
         if not rms(problem.force(internal)) < RULE.fallen * before:
             break
     return _ended(problem, internal, converged)
+
+
+def turned(begun: AxisModel, axis: AxisModel, logs: Sequence[PreparedLog]) -> list[str]:
+    """Names of the laws that were themselves when a fit began, and are others as it ended."""
+    seen = covered(tuple(log.motion for log in logs))
+    first = {f.effect.name: f for f in begun.effects}
+    both = [(f, first[f.effect.name]) for f in axis.effects if f.effect.name in first]
+    return [
+        now.effect.name
+        for now, was in both
+        if now.effect.imitation(now.values, seen) and not was.effect.imitation(was.values, seen)
+    ]
+
+
+def fit_themselves(axis: AxisModel, logs: Sequence[PreparedLog]) -> Fit:
+    """The same with each law as it began that would become another one, such as the one taken out.
+
+    What sticks and slips can be the spring that the axis lacks; then it does not tell whether the
+    spring is needed.
+    """
+    fit = fit_axis(axis, logs)
+    others = turned(axis, fit.axis, logs)
+    if not others:
+        return fit
+    held = axis
+    for name in others:
+        names = frozenset(p.name for p in axis[name].effect.parameters)
+        held = held.with_effect(replace(axis[name], fixed=names))
+    fitted = fit_axis(held, logs)
+    free = fitted.axis
+    for name in others:
+        free = free.with_effect(axis[name])
+    return finished(free, axis, logs, fitted.outcome)
 
 
 def fit_roughly(

@@ -1,4 +1,9 @@
-"""The force balance: log and model -> force residual in newtons on the measured motion."""
+"""The force balance: log and model -> force residual in newtons on the measured motion.
+
+A residual is told in the force as it was logged: what is left of the motor's force, over the gain
+of the axis' actuation (``motor_gain``). A fit minimises just that, so that none can leave less by a
+motor that does less.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +21,7 @@ from identify.dataset.drive import actual_force, parts_of, reading_error, true_m
 from identify.dataset.motion import Blocks, Motion
 from identify.dataset.prepared_log import (
     PreparedLog,
+    motor_gain,
     moving,
     scale_of,
     split_by_log,
@@ -139,10 +145,15 @@ def _under(motion: Motion, force: Array) -> Motion:
     return replace(motion, track=Blocks(np.stack([*motion.signals[:2], force]), motion.raw))
 
 
-def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Force residual (n,) N: averaged command + effects - mass x acceleration, log after log."""
+def unbalanced(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
+    """Averaged command + effects - mass x acceleration, (n,) N, log after log."""
     inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
     return np.asarray(inertia + averaged_force(axis, logs))
+
+
+def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
+    """Force residual (n,) N, log after log: what is unbalanced, in the force as it was logged."""
+    return unbalanced(axis, logs) / motor_gain(axis, logs)
 
 
 def require_residual(axis: AxisModel, dataset: Dataset) -> None:
@@ -233,7 +244,20 @@ def changes(
     spread(walk, product(_walks(axis, where, steps), zip(logs, own, spans, strict=True)))
     if _borne(axis):
         out += _by_load(axis, logs, where, steps)[:, asked]
+    gain = motor_gain(axis, logs)
+    driving = [j for j, c in enumerate(where) if _drives(axis, c)]
+    left = unbalanced(axis, logs)[asked] if driving else 0.0
+    for j in driving:  # the motor's gain changes with them
+        moved = write(axis, [where[j]], read(axis, [where[j]]) + steps[j])
+        out[j] = (left + out[j]) * (gain / motor_gain(moved, logs)) - left
+    if gain != 1.0:
+        out /= gain
     return out
+
+
+def _drives(axis: AxisModel, c: ParameterReference) -> bool:
+    """Whether it is a parameter of what makes the command a force."""
+    return bool(c.effect) and axis[c.effect].effect.kind is Kind.ACTUATION
 
 
 def _by_load(
@@ -333,11 +357,11 @@ def _difference(
 
 
 def _one_by_one(moved: Sequence[AxisModel], unmoved: AxisModel | None, log: PreparedLog) -> Array:
-    """Change (m, n) N of the residual by walks of their own, from an axis or from no force."""
+    """Change (m, n) N of the averaged force by walks of their own, from an axis or from none."""
     if unmoved is None:
         return np.stack([averaged_force(axis, [log]) for axis in moved])
-    base = residual(unmoved, [log])
-    return np.stack([residual(axis, [log]) - base for axis in moved])
+    base = averaged_force(unmoved, [log])
+    return np.stack([averaged_force(axis, [log]) - base for axis in moved])
 
 
 def _together(

@@ -14,7 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import Columns, PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import (
+    Columns,
+    PreparedLog,
+    motor_gain,
+    moving,
+    split_by_log,
+    sticks,
+)
 from identify.estimation.fit import Fit
 from identify.estimation.force_balance import jacobian
 from identify.estimation.splines import STIFFNESS, Linearised, choose_stiffness
@@ -106,7 +113,7 @@ def columns_of(axis: AxisModel, shape: Shape, samples: int) -> Columns:
         for part, scale in zip(parts, scales, strict=True):
             where = [ParameterReference(effect.name, effect.parameter(n)) for n in part.strengths]
             every.append(jacobian(alone, logs, where) @ scale)
-        return split_by_log(np.hstack(every), logs)
+        return split_by_log(np.hstack(every) / motor_gain(axis, logs), logs)
 
     return columns
 

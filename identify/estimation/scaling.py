@@ -2,7 +2,9 @@
 
 A positive parameter is fitted as its logarithm, and one that may not fall below another (Fs >= Fc)
 as its excess over it, so that every inequality holds by construction. Bounds are those that are
-declared; a positive scale is besides sought where the motion can show it.
+declared; a positive scale is besides sought where the motion can show it, and a knee of the
+actuation where the law is itself there: beyond, it would take the command away and no force is left
+to explain.
 """
 
 from __future__ import annotations
@@ -14,8 +16,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.coordinates import covered
 from identify.dataset.prepared_log import PreparedLog, scale_of
-from twin.effect import Parameter
+from twin.effect import Kind, Parameter
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, free_parameters, read, write
 from twin.model.units import Scale, dimension, has_size
@@ -42,6 +45,23 @@ def limits_of(p: Parameter, value: float, scale: Scale) -> Limits:
     return min(low, value), max(high, value)
 
 
+def _fenced(
+    axis: AxisModel,
+    c: ParameterReference,
+    value: float,
+    limits: Limits,
+    logs: Sequence[PreparedLog],
+) -> Limits:
+    """Limits of a parameter that keep a law of the actuation itself on the motion of some logs."""
+    law = axis[c.effect] if c.effect else None
+    if law is None or law.effect.kind is not Kind.ACTUATION:
+        return limits
+    for knee in (k for k in law.effect.knees if k.name == c.parameter.name):
+        low, high = knee.bounds(law.values, covered(tuple(log.motion for log in logs)))
+        limits = min(max(limits[0], low), value), max(min(limits[1], high), value)
+    return limits
+
+
 @dataclass(frozen=True)
 class Scaling:
     """Maps parameters of an axis to internal variables and back.
@@ -62,7 +82,7 @@ class Scaling:
         """For all free parameters of an axis, sought where the motion of some logs shows them."""
         where, scale = free_parameters(axis), scale_of(logs)
         limits = (
-            limits_of(c.parameter, value, scale)
+            _fenced(axis, c, value, limits_of(c.parameter, value, scale), logs)
             for c, value in zip(where, read(axis, where).tolist(), strict=True)
         )
         return cls(where, tuple(limits))

@@ -69,7 +69,7 @@ class Linearised:
         asked[np.flatnonzero(base.kept)[some]] = True
         for log, kept in zip(dataset.training, split_by_log(asked, dataset.training), strict=True):
             begin, end = end, end + int(kept.sum())  # one by one: there are many columns
-            columns[begin:end, first:] = jacobian(alone, [log], own, kept)
+            columns[begin:end, first:] = jacobian(alone, [log], own, kept) / base.gain
         norms = np.linalg.norm(base.jacobian, axis=0)[rest]
         bends = smoothing(base.axis, where, len(base.residual))
         physics = bends.T @ bends + np.diag([*(RIDGE * norms) ** 2, *np.zeros(len(own))])

@@ -228,7 +228,8 @@ def _try(ground: _Ground, shape: dict[str, float]) -> Start:
     silent = all(first.values[p.name] == 0.0 for p in effect.strengths)
     force = ground.unchanged if silent else residual(axis, ground.logs)[ground.kept]
     # A reading's error changes the other forces too, but only to second order.
-    alone = parts_of(axis, Kind.SENSING) if effect.kind is Kind.SENSING else axis
+    apart = (Kind.SENSING, Kind.ACTUATION)
+    alone = parts_of(axis, *apart) if effect.kind is Kind.SENSING else axis
     columns = jacobian(alone, ground.logs, where, ground.kept)
     step = _bounded_step(ground.basis, force, columns, where, first)
     ends = read(axis, where) + step

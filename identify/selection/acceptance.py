@@ -121,7 +121,7 @@ class Judged:
     def training(self) -> Array:
         """Residual (n,) N of the training logs; not a number where it tells nothing."""
         out = np.full(len(self.fit.kept), np.nan)
-        out[self.fit.kept] = self.fit.residual / self.fit.lessened
+        out[self.fit.kept] = self.fit.residual
         return out
 
     @cached_property
@@ -132,8 +132,7 @@ class Judged:
             return left_on(fit, logs)
         columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
         rows = self._smoothing
-        left = left_out(fit.residual, columns, rows.T @ rows)
-        out[fit.kept] = left / fit.lessened
+        out[fit.kept] = left_out(fit.residual, columns, rows.T @ rows)
         return out
 
     def tell(self) -> None:
@@ -182,7 +181,7 @@ class Judged:
 def left_on(fit: Fit, logs: Sequence[PreparedLog]) -> Array:
     """Residual (n,) N of a fit on other logs; not a number where it tells nothing."""
     kept = moving(logs, sticks(fit.axis))
-    return np.where(kept, residual(fit.axis, logs) / fit.lessened, np.nan)
+    return np.where(kept, residual(fit.axis, logs), np.nan)
 
 
 def least_t(among: int) -> float:

@@ -26,8 +26,9 @@ from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
-from twin.effect import Effect, Kind
-from twin.model.machine import AxisModel
+from twin.effect import Effect, Excitation, Kind
+from twin.knee import Imitation
+from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ def candidate_of(
     """
     base, fit, dataset = before.fit, after.fit, before.dataset
     shared = base.kept & fit.kept
-    left, less = (f.residual[shared[f.kept]] / f.lessened for f in (base, fit))
+    left, less = (f.residual[shared[f.kept]] for f in (base, fit))
     added = max(len(fit.scaling.where) - len(base.scaling.where), 1)
     added += phases_found(fit.axis, effect.name, dataset) if effect.name in fit.axis.names else 0
     both = np.isfinite(before.other) & np.isfinite(after.other)
@@ -120,22 +121,15 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     """Why the values that an effect was fitted with cannot be its own; None where they can.
 
     A value that ended at a bound belongs to another law, whatever the bound's sign; a strength at
-    zero is no bound but absence. What repeats along the track has to be seen a few times. An effect
-    that takes the place of the inertia explains nothing: in a motion that repeats in time a sine in
-    time can hold its force. The mass of the base may be wrong for want of this effect, such as a
-    saturation, so it is compared with both the fitted mass and the one that was begun with.
+    zero is no bound but absence. Where the motion does not pass a knee of it, it is another law.
     """
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
+        if imitation := _imitation(fitted, ended, dataset.excitation):
+            return _told_as(imitation, fit.axis)
         if ended:
             return f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound"
-        if effect.is_itself and not effect.is_itself(fitted.values, dataset.excitation):
-            return "its values make another force of it"
-        periods = [fitted.values[p.name] for p in effect.parameters if p.period]
-        travel = np.ptp(np.concatenate([log.motion.position for log in fit.logs]))
-        if periods and travel < RULE.fewest_cycles * max(periods):
-            return "too few of its periods are seen"
         alone = replace(fit.axis, effects=(fitted,))
         if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
             return "the motion repeats with it, so that any force of the motion could be it"
@@ -144,11 +138,28 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
             return "a tenth more or less of what the bodies of the file weigh could be it"
         if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
             return "it takes the place of the friction, which another friction would"
-    masses = (before.fit.axis.mass, before.fit.begun.mass)
-    # 3 times the moved mass of the base or its start, that an effect may leave
-    if not any(m <= 3.0 * fit.axis.mass for m in masses):
+    if _has_lost_inertia(before.fit, fit):
         return "it takes the place of the inertia"
     return None
+
+
+def _imitation(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:
+    """What a law is where it is not itself; ended: labels of what a fit held where it still is."""
+    effect, values = fitted.effect, fitted.values
+    names = [label.split(".")[-1] for label in ended]
+    by_more = 1e-6  # of a value that ended: past the edge of what shows it
+    past = [{**values, n: values[n] * (1.0 + way * by_more)} for n in names for way in (-1, 1)]
+    found = (effect.imitation(each, covered) for each in (values, *past))
+    return next((one for one in found if one), None)
+
+
+def _told_as(imitation: Imitation, axis: AxisModel) -> str:
+    """What an effect of an axis is where it is not itself, in words."""
+    knee, unit = imitation.knee, axis.units(imitation.knee.unit)
+    size, edge = (f"{v:.3g} {unit}" for v in (imitation.size, imitation.edge))
+    side = "below" if imitation.size < imitation.edge else "beyond"
+    value = "" if size == edge else f" of {size}"
+    return f"its {knee.name}{value} is {side} {edge}, so that it is {imitation.of.value} here"
 
 
 def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:
@@ -194,6 +205,21 @@ def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:
     now, was, begun, own = (averaged_force(axis, before.dataset.training) for axis in axes)
     least = min(float(was @ was), float(begun @ begun))
     return float(now @ now) < RULE.collapse**2 * least and _is_of(was - now, own[:, None])
+
+
+def _has_lost_inertia(base: Fit, fit: Fit) -> bool:
+    """Whether the mass has collapsed that a base told.
+
+    In a motion that repeats in time a sine in time can hold its force. Below what the base began
+    with too, as its mass may be wrong for want of this effect. Where what only the mass explains is
+    less than what the base leaves, no motion told it, and it had taken the place of another.
+    """
+    if not fit.axis.mass < RULE.collapse * min(base.axis.mass, base.begun.mass):
+        return False
+    is_mass = np.array([not c.effect for c in base.scaling.where])
+    others = orthonormal(base.jacobian[:, ~is_mass])
+    inertia = unabsorbed(base.axis.mass * base.jacobian[:, is_mass].sum(axis=1), others)
+    return float(inertia @ inertia) > float(base.residual @ base.residual)
 
 
 def noise_candidate(before: Judged, after: Judged, effect: Effect) -> Candidate:

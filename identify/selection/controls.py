@@ -57,8 +57,8 @@ class ControlTest:
             return cls(own, None, fit.floor**2, judged.other_floor**2)
         kept = np.isfinite(judged.other)
         columns = jacobian(fit.axis, holdout, fit.scaling.where, kept) / size
-        force = judged.other[kept] * fit.lessened
-        return cls(own, _Part(holdout, force, columns, kept), fit.floor**2, judged.other_floor**2)
+        there = _Part(holdout, judged.other[kept], columns, kept)
+        return cls(own, there, fit.floor**2, judged.other_floor**2)
 
     @classmethod
     def together(cls, several: Sequence[Judged]) -> ControlTest:
@@ -120,7 +120,7 @@ def change_of(before: Judged, after: Judged) -> Columns:
     """What a change does to the residual, as one column (m, 1) N of each log."""
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
-        both = [residual(j.fit.axis, logs) / j.fit.lessened for j in (before, after)]
+        both = [residual(j.fit.axis, logs) for j in (before, after)]
         return split_by_log((both[1] - both[0])[:, None], logs)
 
     return with_unit_penalty(columns, before.fit)

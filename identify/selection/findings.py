@@ -20,7 +20,7 @@ from enum import Enum
 
 from identify.dataset.dataset import Dataset, Role
 from identify.estimation.evidence import BETTER
-from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis
+from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
@@ -200,7 +200,7 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
         return found.base
     dataset = found.dataset
     begun = (axis, axis.begun_as(base), *_alike(axis, found.passed))
-    fits = [fit_axis(a, dataset.part.training) for a in begun]
+    fits = [fit_themselves(a, dataset.part.training) for a in begun]
     less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
     if dataset.part is not dataset:
         less = finished(less.axis, less.begun, dataset.training, less.outcome)

@@ -12,7 +12,7 @@ from functools import partial
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import knows_rounding
 from identify.estimation.alignment import moved_by
-from identify.estimation.fit import Fit, finished, fit_axis
+from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves, turned
 from identify.estimation.free_curves import shapes_of
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
@@ -182,18 +182,20 @@ def settled(judged: Judged) -> Judged:
 def refitted_on(axis: AxisModel, judged: Judged) -> Judged:
     """An axis fitted to the dataset of a judged fit."""
     dataset = judged.dataset
-    return Judged(replace(fit_axis(axis, dataset.training), begun=judged.fit.begun), dataset)
+    return Judged(replace(fit_themselves(axis, dataset.training), begun=judged.fit.begun), dataset)
 
 
 def fitted_anew(judged: Judged) -> Judged:
     """The fit made again: its shapes scanned, and from the values of the model as it was given.
 
-    What it had beside and lost may have led the shapes of others, and moved the values of all.
+    What it had beside and lost may have led the shapes of others, and moved the values of all. None
+    of its laws may become what was lost.
     """
-    axis, dataset = judged.fit.axis, judged.dataset
-    scanned = fit_multistart(axis, dataset, judged.fit.begun)
-    given = refitted_on(axis.begun_as(judged.fit.begun), judged)
-    return given if given.fit.error < scanned.error else Judged(scanned, dataset)
+    axis, dataset, begun = judged.fit.axis, judged.dataset, judged.fit.begun
+    scanned = Judged(fit_multistart(axis, dataset, begun), dataset)
+    again = (scanned, refitted_on(axis.begun_as(begun), judged))
+    own = [j for j in again if not turned(axis, j.fit.axis, dataset.training)]
+    return min([judged, *own], key=lambda j: j.fit.error)
 
 
 def _as_screened(judged: Judged, screening: Screening) -> Candidate:

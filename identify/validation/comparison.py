@@ -15,12 +15,12 @@ from identify.dataset.prepared_log import (
     PreparedLog,
     moving,
     on_blocks,
+    split_by_log,
     sticks,
     total_force,
 )
 from identify.estimation.evidence import effective_samples, rms
-from identify.estimation.fit import error_on
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import residual, unbalanced
 from identify.validation.free_run import (
     drift_of_noise,
     free_run,
@@ -101,13 +101,17 @@ def compare_axis(
     kept = moving(logs, sticks(axis))
     every = residual(axis, logs)
     force = every[kept]
+    by_log = split_by_log(np.where(kept, every, np.nan), logs)
     if floor is None:
         floor = known_floor(axis, logs, np.where(kept, every, 0.0))
     where = {k: v[kept] for k, v in coordinates(axis, logs).items()}
     maps = [*misfit_maps(axis, logs, floor, force, where), misfit_by_frequency(axis, logs)]
     return AxisComparison(
         axis=dataset.axis,
-        force_error={log.motion.name: rms(error_on(axis, [log])) for log in logs},
+        force_error={
+            log.motion.name: rms(left[~np.isnan(left)])
+            for log, left in zip(logs, by_log, strict=True)
+        },
         floor=floor,
         position_error=position_error,
         position_floor=position_floor,
@@ -190,7 +194,7 @@ def side_by_side(model: MachineModel, parts: Mapping[str, PreparedLog]) -> SideB
         skip = run.begun - log.motion.left_out
         position, velocity, command = log.motion.at_samples(0.0)[:, skip : skip + len(off)]
         times = log.motion.sample_period * np.arange(skip, skip + len(off))
-        left = np.interp(times, log.time - log.motion.time[0], residual(model.axes[axis], [log]))
+        left = np.interp(times, log.time - log.motion.time[0], unbalanced(model.axes[axis], [log]))
         force = np.interp(times, log.time - log.motion.time[0], log.command)
         columns = {
             "measured": {"position": position, "velocity": velocity, "force": command},

@@ -10,10 +10,10 @@ import numpy as np
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise import Noise, noises_of
-from identify.dataset.prepared_log import PreparedLog, at_rest, moving, sticks
+from identify.dataset.prepared_log import PreparedLog, at_rest, motor_gain, moving, sticks
 from identify.dataset.spectrum import densities, pieces_of
 from identify.estimation.fit import Fit
-from identify.estimation.force_balance import residual
+from identify.estimation.force_balance import unbalanced
 from identify.estimation.residual_dependence import UNITS, unit_of
 from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
@@ -156,6 +156,8 @@ def misfit_by_frequency(axis: AxisModel, logs: Sequence[PreparedLog]) -> MisfitM
             for i in (1, 2, 3)
         )
     )
+    gain = motor_gain(axis, logs)
+    error, noise = error / gain, noise / gain
     return MisfitMap(
         coordinate="frequency",
         unit="Hz",
@@ -176,7 +178,7 @@ def _spectrum(axis: AxisModel, log: PreparedLog, noise: Noise) -> tuple[Array, A
     motion = log.motion
     shortest = 8  # blocks of the test functions of the spectrum, the fewest allowed
     short = PreparedLog.of(motion, shortest * motion.period)
-    force = np.where(moving([short], sticks(axis)), residual(axis, [short]), 0.0)
+    force = np.where(moving([short], sticks(axis)), unbalanced(axis, [short]), 0.0)
     period = short.test_function.stride * motion.period
     segment = min(round(4.0 / period), len(force))  # s of each part of a log that is transformed
     both = np.stack([force, short.command - axis.mass * short.acceleration])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.preparation import datasets, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.alignment import aligned
-from identify.estimation.force_balance import effect_forces, residual
+from identify.estimation.force_balance import effect_forces, unbalanced
 from identify.validation.free_run import HORIZON, free_run
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
@@ -148,7 +148,7 @@ def _axis(
         return AxisReplay(units, cut.at(position), cut.at(wanted), cut.at(nothing), {}, strips)
     position = part.motion.position_at_samples(0.0)[cut.begun - part.motion.left_out :][: cut.count]
     off = nothing if error is None else error[part.motion.axis]
-    left = cut.interpolated(part.time, residual(own, [part]))
+    left = cut.interpolated(part.time, unbalanced(own, [part]))
     unexplained = Strip(f"{units.words('force')} left over", units.force, cut.range(left))
     drift = Strip("model - measured", units.position, cut.range(off))
     added = {

@@ -6,6 +6,8 @@ with slope 1 and equal breakpoints.
 """
 
 from twin.effect import MOST, Effect, Kind, Parameter, U
+from twin.knee import Imitated
+from twin.law_parts import at
 
 
 def law(p, s, io):
@@ -19,6 +21,7 @@ EFFECT = Effect(
     source="Tao, Kokotovic 1994, dead-zone of slope 1",
     parameters=(Parameter("width", "N", 0.0, 0.0, MOST, "threshold", strength=True),),
     law=law,
+    knees=(at("width", "N", lambda e: (0.0, e.force_usual), above=Imitated.GAIN),),
     fingerprint="residual opposes the command with one size, whichever way the axis moves",
     excited_by="commands of both signs in each direction of motion: acceleration and braking",
 )

@@ -6,7 +6,8 @@ K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd ed., section 2.3 (
 """
 
 from twin.effect import Effect, Kind, Parameter, U
-from twin.law_parts import PAST_STATES, delayed
+from twin.knee import Imitated
+from twin.law_parts import PAST_STATES, delayed, late_by
 
 
 def law(p, s, io):
@@ -21,6 +22,7 @@ EFFECT = Effect(
     parameters=(Parameter("tau", "s", 0.0, 0.0, 6e-3, "dead time", strength=True),),
     states=PAST_STATES,
     law=law,
+    knees=(late_by("tau", Imitated.INERTIA),),
     fingerprint="residual follows the rate of change of the command, at every speed and place",
     dead_time=True,
     excited_by="moves with high jerk: the command must change fast",

@@ -9,6 +9,8 @@ K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd ed., section 2.3 (
 from math import expm1
 
 from twin.effect import DT, INDEX, Effect, Kind, Parameter, U
+from twin.knee import Imitated
+from twin.law_parts import late_by
 
 
 def law(p, s, io):
@@ -32,6 +34,7 @@ EFFECT = Effect(
     parameters=(Parameter("tau", "s", 0.0, 0.0, 0.1, "time constant", strength=True),),
     states=("force",),
     law=law,
+    knees=(late_by("tau", Imitated.GAIN),),
     fingerprint="residual follows the rate of change of the command, and fades after a step of it",
     excited_by="moves with high jerk: the command must change fast",
 )

@@ -6,6 +6,8 @@ Systems, 3rd ed., section 1.2.7; the partial loss is this project's choice.
 """
 
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U
+from twin.knee import Imitated
+from twin.law_parts import at
 
 
 def law(p, s, io):
@@ -27,6 +29,9 @@ EFFECT = Effect(
         Parameter("loss", "1", 0.0, 0.0, 1.5, "part lost of what is above", strength=True),
     ),
     law=law,
+    knees=(
+        at("limit", "N", lambda e: (e.force_usual, e.force_max), Imitated.GAIN, Imitated.NOTHING),
+    ),
     fingerprint="residual opposes the command at its peaks and is zero below",
     excited_by="the strongest accelerations the machine is used with",
 )  # fmt: skip

@@ -10,7 +10,8 @@ the dead zone. The step is that of a load on a spring (flexible mode) but for th
 """
 
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter
-from twin.law_parts import hung_load
+from twin.knee import Imitated
+from twin.law_parts import at, hung_load, swings_at
 
 
 def law(p, s, io):
@@ -41,6 +42,13 @@ EFFECT = Effect(
     ),
     states=("displacement", "speed"),
     law=law,
+    knees=(
+        at(
+            "play", "m", lambda e: (e.shortest, e.travel), Imitated.LOAD_ON_SPRING,
+            Imitated.INERTIA,
+        ),
+        swings_at("frequency", Imitated.INERTIA, None),
+    ),
     attach=attach,
     fingerprint="residual is a free flight and a knock after each change of sign of the force",
     excited_by="moves that accelerate and brake in turn, gently enough to cross the play slowly",

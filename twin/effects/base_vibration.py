@@ -16,7 +16,8 @@ which the whole, axis held, oscillates and decays over a sample exactly as the e
 from math import log
 
 from twin.effect import DT, MOVED, NET, OUT, WHEN, Effect, Excitation, Kind, Parameter
-from twin.law_parts import oscillator
+from twin.knee import Imitated
+from twin.law_parts import oscillator, swings_at
 
 
 def law(p, s, io):
@@ -60,6 +61,7 @@ EFFECT = Effect(
     ),
     states=("displacement", "speed"),
     law=law,
+    knees=(swings_at("frequency", Imitated.INERTIA, Imitated.NOTHING),),
     of_joints=False,
     attach=attach,
     fingerprint="residual swings at a few hertz after every acceleration, also at rest",

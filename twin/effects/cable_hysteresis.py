@@ -10,7 +10,7 @@ and exact for motion in one direction within a sample.
 """
 
 from twin.effect import Effect, Kind
-from twin.law_parts import LAYERS, on_a_cable, slipping_layers
+from twin.law_parts import LAYERS, LAYERS_SLIP, on_a_cable, slipping_layers
 
 
 def law(p, s, io):
@@ -25,6 +25,7 @@ EFFECT = Effect(
     parameters=LAYERS,
     states=("e0", "e1", "e2", "e3"),
     law=law,
+    knees=(LAYERS_SLIP,),
     fingerprint="residual bends over millimetres after each reversal, at every speed alike",
     excited_by="slow passes with reversals at many places, and inner loops of millimetres",
     suits=on_a_cable,

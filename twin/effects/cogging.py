@@ -13,6 +13,7 @@ from twin.law_parts import (
     harmonics,
     of_shortest_pitch,
     pitches_to_try,
+    repeats_after,
 )
 
 CYCLES = 120  # most over the travel that are tried before a model tells them
@@ -40,6 +41,7 @@ EFFECT = Effect(
         *harmonic_terms(3, "N"),
     ),
     law=law,
+    knees=(repeats_after("p"),),
     columns=columns,
     simplest=of_shortest_pitch,
     curves=(Curve(Coordinate.POSITION, period="p"),),

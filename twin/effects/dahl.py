@@ -12,7 +12,13 @@ from math import copysign, exp, expm1, log, log1p
 
 from twin.curve import FRICTION_CURVES
 from twin.effect import DRY, DT, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
-from twin.law_parts import COULOMB_LEVEL, VISCOUS_PART, dry_and_viscous, stiffness_at_rest
+from twin.law_parts import (
+    COULOMB_LEVEL,
+    DEFLECTION,
+    VISCOUS_PART,
+    dry_and_viscous,
+    stiffness_at_rest,
+)
 
 
 def law(p, s, io):
@@ -49,6 +55,7 @@ EFFECT = Effect(
     ),
     states=("F",),
     law=law,
+    knees=(DEFLECTION,),
     joint_attributes=dry_and_viscous,
     curves=FRICTION_CURVES,
     fingerprint="residual after every reversal over a fixed distance, the same at every speed",

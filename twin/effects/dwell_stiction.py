@@ -12,6 +12,8 @@ threshold of speed is needed. The age is exact over a sample of constant speed.
 from math import exp, expm1
 
 from twin.effect import DT, LEAST, MOST, STATIC, Effect, Kind, Parameter, V
+from twin.knee import Imitated
+from twin.law_parts import at
 
 
 def law(p, s, io):
@@ -40,6 +42,10 @@ EFFECT = Effect(
     ),
     states=("age",),
     law=law,
+    knees=(
+        at("time", "s", lambda e: (e.period, e.duration), Imitated.DRY_FRICTION),
+        at("slip", "m", lambda e: (0.0, e.travel), above=Imitated.DRIFT),
+    ),
     fingerprint="residual peak at the start of a motion, higher the longer the rest before it",
     excited_by="slow starts after rests of very different lengths",
 )  # fmt: skip

@@ -6,7 +6,8 @@ section 2.3, where the input is held instead); the straight line is a choice.
 """
 
 from twin.effect import READING, Effect, Kind, Parameter
-from twin.law_parts import PAST_STATES, delayed
+from twin.knee import Imitated
+from twin.law_parts import PAST_STATES, delayed, late_by
 
 
 def law(p, s, io):
@@ -21,6 +22,7 @@ EFFECT = Effect(
     parameters=(Parameter("tau", "s", 0.0, 0.0, 6e-3, "age of the reading", strength=True),),
     states=PAST_STATES,
     law=law,
+    knees=(late_by("tau", Imitated.INERTIA),),
     fingerprint="residual follows the jerk: the force comes before the acceleration it causes",
     dead_time=True,
     excited_by="moves with high jerk: the acceleration must change fast",

@@ -8,7 +8,7 @@ of a phase error is left out, a shift of zero.
 """
 
 from twin.effect import LEAST, MOST, READING, Effect, Kind, Parameter
-from twin.law_parts import columns_of, harmonic_terms, harmonics, ripple
+from twin.law_parts import columns_of, harmonic_terms, harmonics, repeats_after, ripple
 
 SCALES = (2e-6, 4e-6, 8e-6, 1e-5, 1.6e-5, 2e-5, 4e-5, 1e-4)  # m; longer ones show as ripples
 
@@ -34,6 +34,7 @@ EFFECT = Effect(
         *harmonic_terms(2, "m"),
     ),
     law=law,
+    knees=(repeats_after("period"),),
     columns=columns,
     fingerprint="command and speed ripple at a frequency of speed over the signal period",
     excited_by="slow constant speeds over many signal periods",

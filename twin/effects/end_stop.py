@@ -10,6 +10,7 @@ which no force changes, the law is as printed.
 from collections.abc import Mapping
 
 from twin.effect import DT, MASS, MOST, OUT, Effect, Excitation, Kind, Parameter, V, X
+from twin.knee import Imitated, Knee
 
 STOPS = (0.005, 0.01, 0.02, 0.035, 0.05)  # places tried, parts of what was reached, from its ends
 
@@ -18,11 +19,19 @@ LEAST_FREE = 0.9  # part of the travel between the stops; what yields further is
 LEAST_PUSH = 0.25  # of the dry friction, where the travel reaches deepest
 
 
-def is_itself(values: Mapping[str, float], covered: Excitation) -> bool:
-    """Whether stops end the travel, and push."""
-    free, (low, high) = values["high"] - values["low"], covered.been
-    push = values["stiffness"] * max(high - values["high"], values["low"] - low)
-    return free > LEAST_FREE * (high - low) and push > LEAST_PUSH * covered.dry_level
+def push(values: Mapping[str, float], covered: Excitation) -> float:
+    """Force, N, where the travel reaches deepest."""
+    low, high = covered.been
+    return values["stiffness"] * max(high - values["high"], values["low"] - low)
+
+
+FREE = Knee(
+    "free travel", "m", lambda v, e: v["high"] - v["low"],
+    lambda v, e: (LEAST_FREE * (e.been[1] - e.been[0]), MOST), Imitated.OF_POSITION,
+)  # fmt: skip
+PUSH = Knee(
+    "largest push", "N", push, lambda v, e: (LEAST_PUSH * e.dry_level, MOST), Imitated.NOTHING
+)
 
 
 def inwards(covered: Excitation, end: int) -> tuple[float, ...]:
@@ -65,7 +74,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    knees=(FREE, PUSH),
     fingerprint="residual pushes inwards at the ends of the travel and is zero between",
     excited_by="slow moves to both ends of the travel",
-    is_itself=is_itself,
 )  # fmt: skip

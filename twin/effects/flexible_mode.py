@@ -17,7 +17,8 @@ step is stable.
 from math import log
 
 from twin.effect import Effect, Excitation, Kind, Parameter
-from twin.law_parts import hung_load
+from twin.knee import Imitated
+from twin.law_parts import hung_load, swings_at
 
 
 def law(p, s, io):
@@ -55,6 +56,7 @@ EFFECT = Effect(
     ),
     states=("displacement", "speed"),
     law=law,
+    knees=(swings_at("frequency", Imitated.INERTIA, Imitated.INERTIA),),
     attach=attach,
     fingerprint="residual rings at one frequency after every change of acceleration",
     excited_by="moves with high jerk, and a force sweep through the resonance",

@@ -7,11 +7,13 @@ magnet motors", Proc. American Control Conference 2001.
 """
 
 from twin.effect import LEAST, MOST, Effect, Kind, Parameter, U, X
+from twin.knee import Imitated
 from twin.law_parts import (
     RIPPLE_CYCLES,
     harmonic_terms,
     of_shortest_pitch,
     pitches_to_try,
+    repeats_after,
     ripple,
 )
 
@@ -33,6 +35,7 @@ EFFECT = Effect(
         *harmonic_terms(2, "1", 0.5),
     ),
     law=law,
+    knees=(repeats_after("p", Imitated.GAIN),),
     simplest=of_shortest_pitch,
     several=True,
     fingerprint="residual repeats along the track in proportion to the motor force there",

@@ -6,11 +6,13 @@ M. Walther, A. Verl, "Periodic variation of preloading in ball screws", Prod. En
 """
 
 from twin.effect import DRY, LEAST, MOST, Effect, Kind, Parameter, X
+from twin.knee import Imitated
 from twin.law_parts import (
     RIPPLE_CYCLES,
     harmonic_terms,
     of_shortest_pitch,
     pitches_to_try,
+    repeats_after,
     ripple,
 )
 
@@ -32,6 +34,7 @@ EFFECT = Effect(
         *harmonic_terms(2, "1", 0.5),
     ),
     law=law,
+    knees=(repeats_after("p", Imitated.DRY_FRICTION),),
     simplest=of_shortest_pitch,
     several=True,
     fingerprint="residual repeats along the track and flips with the direction of motion",

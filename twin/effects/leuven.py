@@ -28,6 +28,7 @@ from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 from twin.law_parts import (
     BRISTLE_DAMPING,
+    DEFLECTION,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
     VISCOUS_PART,
@@ -134,6 +135,7 @@ EFFECT = Effect(
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
+    knees=(DEFLECTION,),
     curves=STRIBECK_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",

@@ -13,6 +13,7 @@ from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, V
 from twin.law_parts import (
     BRISTLE_DAMPING,
+    DEFLECTION,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
     VISCOUS_PART,
@@ -70,6 +71,7 @@ EFFECT = Effect(
     ),
     states=("z",),
     law=law,
+    knees=(DEFLECTION,),
     joint_attributes=dry_and_viscous,
     motor_attributes=motor_attributes,
     curves=STRIBECK_CURVES,

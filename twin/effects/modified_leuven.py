@@ -25,6 +25,7 @@ from twin.curve import STRIBECK_CURVES
 from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Parameter, V
 from twin.law_parts import (
     BRISTLE_DAMPING,
+    ELEMENTS_SLIP,
     SPREAD,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
@@ -143,6 +144,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=tuple(f"F_{i}" for i in range(1, elements + 1)),
         law=law,
+        knees=(ELEMENTS_SLIP,),
         curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",

@@ -9,6 +9,8 @@ section 3.3 (response to an arbitrary periodic input).
 from math import cos, pi, sin
 
 from twin.effect import DT, MOST, OUT, TIME, Effect, Excitation, Kind, Parameter
+from twin.knee import Imitated
+from twin.law_parts import swings_at
 
 
 def law(p, s, io):
@@ -34,6 +36,7 @@ EFFECT = Effect(
         Parameter("b", "N", 0.0, -MOST, MOST, "cosine term", strength=True),
     ),
     law=law,
+    knees=(swings_at("f", Imitated.DRIFT, Imitated.NOTHING),),
     several=True,
     fingerprint="residual repeats in time at one frequency, whatever the axis does",
     excited_by="any motion; a log of many periods, also at rest",

@@ -7,7 +7,7 @@ F. Al-Bender et al., IEEE TAC 50 (2005). The layers of a cable are the same law.
 """
 
 from twin.effect import Effect, Kind
-from twin.law_parts import LAYERS, slipping_layers, without_a_cable
+from twin.law_parts import LAYERS, LAYERS_SLIP, slipping_layers, without_a_cable
 
 
 def law(p, s, io):
@@ -22,6 +22,7 @@ EFFECT = Effect(
     parameters=LAYERS,
     states=("e0", "e1", "e2", "e3"),
     law=law,
+    knees=(LAYERS_SLIP,),
     fingerprint="residual bends over a distance after each reversal, at every speed alike",
     excited_by="slow passes with reversals at many places, and inner loops",
     suits=without_a_cable,

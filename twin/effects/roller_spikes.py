@@ -12,11 +12,17 @@ from math import floor
 
 from twin.curve import Coordinate, Curve
 from twin.effect import LEAST, MOST, OUT, Effect, Kind, Parameter, X
-from twin.law_parts import turned
+from twin.knee import Imitated, Knee
+from twin.law_parts import repeats_after, turned
 
 TURN = 5e-3  # of a bump's width, the travel over which a reversal turns the braking part round
 PITCH = 0.1  # of the travel, where no design tells it
 WIDTHS = (0.06, 0.18, 0.44)  # of the pitch
+# Bumps wider than their distance leave nothing between them.
+APART = Knee(
+    "width", "m", lambda v, e: v["width"], lambda v, e: (e.resolution, v["pitch"]),
+    Imitated.ROUNDING, Imitated.CONSTANT,
+)  # fmt: skip
 
 
 def law(p, s, io):
@@ -55,8 +61,7 @@ EFFECT = Effect(
     ),
     states=("direction",),
     law=law,
-    # Bumps wider than their distance leave nothing between them: a constant or a friction.
-    is_itself=lambda values, e: values["width"] <= values["pitch"],
+    knees=(APART, repeats_after("pitch")),
     curves=(Curve(Coordinate.POSITION, period="pitch", by_direction=True),),
     fingerprint="narrow peaks of the residual at equal distances along the track",
     excited_by="constant-speed passes over several pitches in both directions",

@@ -14,12 +14,14 @@ from math import copysign
 
 from twin.curve import STRIBECK_CURVES
 from twin.effect import HOLD, OUT, VISCOUS, Effect, Kind, V
+from twin.knee import Imitated
 from twin.law_parts import (
     COULOMB_LEVEL,
     STATIC_LEVEL,
     STRIBECK_EXPONENT,
     STRIBECK_VELOCITY,
     VISCOUS_PART,
+    bends_at,
     dry_and_viscous,
     stribeck_level,
 )
@@ -56,6 +58,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
+    knees=(bends_at("v0", Imitated.DRY_FRICTION),),
     joint_attributes=dry_and_viscous,
     curves=STRIBECK_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",

@@ -11,6 +11,8 @@ is an assumption. E is exact over a sample of constant power; friction keeps a t
 from math import exp
 
 from twin.effect import DRY, DT, FRICTION, MOST, VISCOUS, Effect, Kind, Parameter, V
+from twin.knee import Imitated
+from twin.law_parts import at
 
 LARGEST = 3.0  # exponent at which the loss ends: 1/20 of the friction is left
 
@@ -42,6 +44,7 @@ EFFECT = Effect(
     ),
     states=("heat",),
     law=law,
+    knees=(at("tau", "s", lambda e: (e.stroke, e.duration), Imitated.OF_SPEED),),
     fingerprint="residual opposes friction and grows with the work done so far, fades after rests",
     excited_by="minutes of steady motion from cold, then a rest, then motion again",
 )  # fmt: skip

@@ -8,6 +8,7 @@ method for parameter identification of robot dynamics", IEEE TCST 21 (2013), for
 from math import copysign
 
 from twin.effect import MOST, MOST_JOINTS, OUT, SPEEDS, Effect, Kind, Parameter, V
+from twin.knee import Imitated, Knee
 
 
 def law(p, s, io):
@@ -15,6 +16,13 @@ def law(p, s, io):
     sliding = copysign(p[0], w) if w != 0.0 else 0.0
     io[OUT] = -(sliding + p[1] * w)
 
+
+def to_next(values, covered):
+    """How far its number is from that of another joint."""
+    return min((abs(values["joint"] - j) for j in covered.other_joints), default=MOST)
+
+
+OTHER_JOINT = Knee("joint", "1", to_next, lambda v, e: (0.0, 0.0), above=Imitated.OF_THIS_JOINT)
 
 EFFECT = Effect(
     kind=Kind.FORCE,
@@ -34,8 +42,8 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    knees=(OTHER_JOINT,),
     of_joints=True,
-    is_itself=lambda values, e: values["joint"] in e.other_joints,
     fingerprint="residual steps where the sum of two joints' speeds changes its sign",
     excited_by="moves of the two joints at different times, with reversals of each",
 )  # fmt: skip

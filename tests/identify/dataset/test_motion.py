@@ -25,10 +25,11 @@ from constructed import (
 from identify.analysis.first_model import first_model
 from identify.dataset.bodies import PIECE, bodies_along
 from identify.dataset.coordinates import excitation
-from identify.dataset.drive import actual_force, forces_lessened, reading_error, true_motion
+from identify.dataset.drive import actual_force, reading_error, true_motion
 from identify.dataset.motion import SMOOTHED, Blocks, Columns, Motion, motion_of
+from identify.dataset.prepared_log import motor_gain
 from identify.dataset.test_function import TestFunction
-from identify.estimation.force_balance import averaged_force
+from identify.estimation.force_balance import averaged_force, residual, unbalanced
 from identify.workflow import fit
 from twin.effects import load_catalogue
 from twin.errors import InputError
@@ -237,19 +238,23 @@ def test_an_actuation_adds_the_mean_of_what_it_makes_of_the_command_to_the_resid
     )
 
 
-def test_a_motor_counts_as_weaker_from_less_than_half_its_force():
+def test_an_error_is_told_in_the_force_as_it_was_logged():
     """A saturation that loses all above its limit lowers a constant command by what it says."""
 
-    def motions(*levels):
-        return [SHORT.with_force(0.0 * SHORT.raw[1] + v) for v in levels]
+    def logs(*levels):
+        return [windowed(SHORT.with_force(0.0 * SHORT.raw[1] + v)) for v in levels]
 
     limited = effect("actuator_saturation", {"limit": 1.0, "loss": 1.0})
     axis = AxisModel(1.0, effects=(limited,))
-    assert forces_lessened(axis, motions(1.9)) == 1.0
-    assert forces_lessened(axis, motions(2.1)) == pytest.approx(1.0 / 2.1)
-    assert forces_lessened(axis, motions(4.0, 3.0)) == pytest.approx(np.sqrt(2.0) / 5.0)
+    assert motor_gain(AxisModel(1.0), logs(2.1)) == 1.0
+    assert motor_gain(axis, logs(1.25)) == pytest.approx(0.8)
+    assert motor_gain(axis, logs(4.0, 3.0)) == pytest.approx(np.sqrt(2.0) / 5.0)
+    left = residual(axis, logs(1.25)) * 0.8
+    np.testing.assert_allclose(left, residual(AxisModel(1.0), logs(1.0)))
+    more = AxisModel(1.0, effects=(effect("torque_constant", {"error": 0.25}),))
+    np.testing.assert_allclose(unbalanced(more, logs(2.0)), 1.25 * residual(more, logs(2.0)))
     dead = AxisModel(1.0, effects=(effect("actuator_deadband", {"width": 9.0}),))
-    assert forces_lessened(dead, motions(4.0)) == 1e-6
+    assert np.isfinite(residual(dead, logs(4.0))).all()
 
 
 def test_a_late_reading_is_undone():

@@ -128,7 +128,7 @@ def test_a_fit_is_at_its_floor_below_a_ratio():
         assert scaled.ratio == pytest.approx(ratio * RULE.at_floor)
         assert scaled.at_floor is wanted
     assert np.isnan(rms(np.zeros(0)))
-    assert fit.lessened == 1.0
+    assert fit.gain == 1.0
     assert finished(fit.axis, fit.axis, LOGS, Outcome.AT_BOUND).outcome is Outcome.AT_BOUND
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from constructed import COVERED
 from effect_runs import FRICTIONS, LOG
 from machines import CATALOGUE, PROTON
 
@@ -70,29 +69,6 @@ def test_all_but_a_friction_is_absent_at_its_start() -> None:
         assert effect.is_present(effect.starts()) == friction
         read_off = effect.name == "encoder_quantization"  # the step of the readings
         assert effect.is_present(effect.starts(LOG)) == (friction or read_off)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "push", "itself"),
-    [(0.04, 0.0, 0.5, True), (0.0, 0.04, 0.5, True), (0.04, 0.04, 0.5, True),
-     (0.04, 0.0, 0.2, False), (0.0, 0.04, 0.2, False),  # it hardly pushes
-     (0.06, 0.06, 1e3, False), (0.0, 0.11, 1e3, False)],  # it leaves the travel no freedom
-)  # fmt: skip
-def test_an_end_stop_ends_a_travel_and_pushes(low, high, push, itself):
-    """Stops so far from the ends, parts of the travel; push: over the dry friction."""
-    values = {
-        "low": COVERED.position_low + low * COVERED.travel,
-        "high": COVERED.position_high - high * COVERED.travel,
-        "stiffness": push * COVERED.dry_level / (0.04 * COVERED.travel), "relaxation": 0.0,
-    }  # fmt: skip
-    assert CATALOGUE["end_stop"].is_itself(values, COVERED) is itself
-
-
-@pytest.mark.parametrize(("width", "itself"), [(0.004, True), (0.5, False)])
-def test_bumps_have_a_distance(width, itself):
-    """Wider ones make a constant force, which had been named so."""
-    values = {"pitch": 0.034, "width": width, "phase": 0.0, "ahead": 1.0, "behind": 1.0}
-    assert CATALOGUE["roller_spikes"].is_itself(values, COVERED) is itself
 
 
 def law(p, s, io):

@@ -28,7 +28,8 @@ def scaled(e: Excitation, force: float, length: float, time: float) -> Excitatio
         length * e.position_low, length * e.position_high, length / time * e.speed_max,
         force * e.dry_level, time * e.duration, time * e.period, force * e.force_max,
         Repeating(tuple(f / time for f in e.lines)), tuple(length * r for r in e.ripples),
-        length * e.resolution, other_joints=e.other_joints,
+        length * e.resolution, other_joints=e.other_joints, force_usual=force * e.force_usual,
+        speed_least=length / time * e.speed_least, shortest=length * e.shortest,
     )  # fmt: skip
 
 
@@ -85,6 +86,18 @@ def test_a_scan_is_sorted_within_bounds_and_in_the_units_of_the_log(name: str) -
             np.testing.assert_array_equal(p.scan(scaled(LOG, *units)), tried)
     else:
         assert follows_units(p.scan, p.unit)
+
+
+KNEES = [(e, knee) for e in CATALOGUE.values() for knee in e.knees]
+
+
+@pytest.mark.parametrize(("effect", "knee"), KNEES, ids=lambda one: one.name)
+def test_what_a_log_shows_of_a_knee_is_in_the_units_of_the_log(effect, knee) -> None:
+    if knee.name not in ("width", "free travel", "largest push", "joint"):  # of values
+        for end in (0, 1):
+            assert follows_units(
+                lambda e, end=end: knee.shown(effect.starts(LOG), e)[end], knee.unit
+            )
 
 
 MEANT = {
