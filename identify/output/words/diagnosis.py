@@ -158,7 +158,11 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
     if one.chosen.on is not Role.TRAINING:
         other = quantity(one.chosen.after / one.left, one.unit)
         said += f" and {chosen:.2f} times that of {other} on the {one.chosen.on.value} logs"
-    what = "noise" if max(chosen, fitted) < RULE.at_floor else "something else is missing too"
+    what = "something else is missing too"
+    if max(chosen, fitted) < RULE.at_floor:
+        what = "noise"
+    elif found.dataset.force_noise:
+        what = "nothing that was measured predicts it, and its origin is not known"
     return [f"{said}: {what}."]
 
 
