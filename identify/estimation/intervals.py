@@ -21,13 +21,16 @@ from functools import lru_cache
 
 import numpy as np
 
+from identify.dataset.prepared_log import scale_of
 from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
 from identify.estimation.fit import Fit, is_linear
 from identify.estimation.force_balance import STEP, changes
 from identify.estimation.least_squares import ROUNDING
 from identify.rules import RULE
+from twin.effect import Parameter
 from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
+from twin.model.units import Scale, has_size
 from twin.signals import Array
 
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
@@ -118,7 +121,21 @@ def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
     out |= {c.label: NotExcited() for c, w in zip(where, half, strict=True) if not w < np.inf}
     asked = [j for j, c in enumerate(where) if c.label not in out]
     sides = open_sides(fit, [where[j] for j in asked], half[asked])
-    return out | {label: OpenSided(side) for label, side in sides.items()}
+    out |= {label: OpenSided(side) for label, side in sides.items()}
+    scale, values = scale_of(fit.logs), read(fit.axis, where).tolist()
+    return out | {
+        c.label: NotExcited()
+        for c, width, value in zip(where, half, values, strict=True)
+        if c.label not in out and width > _widest(c.parameter, value, scale)
+    }
+
+
+def _widest(p: Parameter, value: float, scale: Scale) -> float:
+    """Half the width of an interval, in the parameter's unit, from which it tells nothing."""
+    if not has_size(p.unit):
+        return np.inf
+    # 10 times the value and what alone would take the whole force, or all of the travel
+    return 10.0 * max(abs(value), scale.size(p.unit))
 
 
 def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
