@@ -67,7 +67,7 @@ def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> Non
 
 
 def is_driven(axis: AxisModel | None) -> bool:
-    """Whether an axis, None where nothing is known of it, tells its mass by a force that varies."""
+    """Whether an axis, None where nothing is known of it, tells its mass by a force alone."""
     return axis is None or axis.is_imposed or not axis.mass_fixed
 
 
@@ -85,20 +85,19 @@ def shortness(log: Log) -> str | None:
 def silence(log: Log, axis: str, *, driven: bool = True) -> str | None:
     """Why a log says nothing of one of its axes, and what to give; None where it says something.
 
-    driven: whether its force must vary, without which no mass shows; of a mass that is held a
+    driven: whether there must be a force, without which no mass shows; of a mass that is held a
     motion without force shows the friction.
     """
     if short := shortness(log):
         return short
-    own = log.axes[axis]
     if not moves(log, axis):
         return f"axis {axis} stands still in it; give one in which it moves"
-    if driven and np.ptp(own.force) == 0.0:
-        units = own.kind
+    if driven and not log.axes[axis].force.any():
+        units = log.axes[axis].kind
         return (
-            f"the {units.words('force')} of axis {axis} is {own.force[0]:.6g} {units.force} "
-            f"throughout; give one with that channel connected, or hold the {units.mass_name} "
-            "(fixed) where the axis coasts"
+            f"the {units.words('force')} of axis {axis} is 0 {units.force} throughout; give one "
+            f"with that channel connected, or hold the {units.mass_name} (fixed) where the axis "
+            "coasts"
         )
     return None
 

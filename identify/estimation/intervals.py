@@ -20,6 +20,7 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import scale_of
 from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
@@ -118,7 +119,8 @@ def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
     """Why parameters have none of their own, however good the model is."""
     where = fit.scaling.where
     out: dict[str, NoInterval] = {label: Inseparable(o) for label, o in inseparable(fit).items()}
-    out |= {c.label: NotExcited() for c, w in zip(where, half, strict=True) if not w < np.inf}
+    shown = _shown(fit, half)
+    out |= {c.label: NotExcited() for c, each in zip(where, shown, strict=True) if not each}
     asked = [j for j, c in enumerate(where) if c.label not in out]
     sides = open_sides(fit, [where[j] for j in asked], half[asked])
     out |= {label: OpenSided(side) for label, side in sides.items()}
@@ -130,12 +132,23 @@ def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
     }
 
 
+def _shown(fit: Fit, half: Array) -> NDArray[np.bool_]:
+    """Which parameters (k,) make a force beyond rounding where they are as large as the machine."""
+    scale = scale_of(fit.logs)
+    sizes = [_size(c.parameter, scale) for c in fit.scaling.where]
+    with np.errstate(invalid="ignore"):  # of no force at all
+        force = np.sqrt(np.mean(fit.jacobian**2, axis=0)) * sizes
+    return np.asarray((half < np.inf) & (force > np.sqrt(np.finfo(float).eps) * scale.force))
+
+
+def _size(p: Parameter, scale: Scale) -> float:
+    """What alone would take the whole force, or all of the travel; infinite where there is none."""
+    return scale.size(p.unit) if has_size(p.unit) else np.inf
+
+
 def _widest(p: Parameter, value: float, scale: Scale) -> float:
     """Half the width of an interval, in the parameter's unit, from which it tells nothing."""
-    if not has_size(p.unit):
-        return np.inf
-    # 10 times the value and what alone would take the whole force, or all of the travel
-    return 10.0 * max(abs(value), scale.size(p.unit))
+    return 10.0 * max(abs(value), _size(p, scale))
 
 
 def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:
