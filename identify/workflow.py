@@ -16,7 +16,7 @@ from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import require_moving, shortness
-from identify.dataset.preparation import datasets, tell_left_out, telling
+from identify.dataset.preparation import datasets, tell_left_out, telling, those_told
 from identify.dataset.prepared_log import sticks
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
@@ -444,7 +444,7 @@ def feedforward(
     before = None if before is None else as_model(before, catalogue)
     simulated = model if machine is None else as_model(machine, catalogue)
     given = dict(given)  # each is read once
-    moved = _told_apart(given, {name: unmoved(model, log) for name, log in given.items()})
+    moved = those_told(given, {name: unmoved(model, log) for name, log in given.items()})
     found = tracking(simulated, model, before, moved, progress)
     return Feedforward(model, before, tuple(moved), found)
 
@@ -464,17 +464,8 @@ def frequency_response(
     """
     given = dict(logs_by_name(logs))  # each is read once
     machine = None if model is None else as_model(model, catalogue)
-    kept = _told_apart(given, {name: shortness(log) for name, log in given.items()})
+    kept = those_told(given, {name: shortness(log) for name, log in given.items()})
     return FrequencyResponse(tuple(kept), responses_of(kept, machine, progress))
-
-
-def _told_apart(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:
-    """The logs without a reason to leave them out; the others are told. Raises InputError."""
-    left_out = {name: reason for name, reason in why.items() if reason is not None}
-    if len(left_out) == len(logs):
-        raise InputError(": ".join(next(iter(left_out.items()))))
-    tell_left_out(left_out)
-    return {name: log for name, log in logs.items() if name not in left_out}
 
 
 def on_machine(

@@ -225,6 +225,18 @@ def tell_left_out(logs: Mapping[str, str]) -> None:
         LOGGER.warning("%s is left out: %s", name, why)
 
 
+def those_told(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:
+    """The logs without a reason to leave them out; the others are told. InputError where all are.
+
+    why: by name.
+    """
+    left_out = {name: reason for name, reason in why.items() if reason is not None}
+    if len(left_out) == len(logs):
+        raise InputError(": ".join(next(iter(left_out.items()))))
+    tell_left_out(left_out)
+    return {name: log for name, log in logs.items() if name not in left_out}
+
+
 def is_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> bool:
     """Whether the training logs say more than so many numbers.
 
