@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,13 +10,14 @@ from typing import Any
 
 from identify.analysis.cable_force import cable_force as cable_force
 from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
+from identify.analysis.first_model import Masses, unused
 from identify.analysis.first_model import first_model as shown_by
 from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.given_logs import require_moving
-from identify.dataset.preparation import datasets, telling
+from identify.dataset.given_logs import require_moving, shortness
+from identify.dataset.preparation import datasets, tell_left_out, telling, those_told
 from identify.dataset.prepared_log import sticks
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
@@ -24,6 +25,7 @@ from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.free_curves import having_shape
 from identify.estimation.intervals import estimates, intervals_to_keep
+from identify.estimation.offered import not_tried, offered, require_shown, telling_beside
 from identify.estimation.open_loop import simulated_error
 from identify.estimation.residual_noise import noise_known, with_own_noise
 from identify.estimation.simulated_motion import fit_simulated_motion
@@ -58,7 +60,7 @@ from identify.selection.trying import reshape, try_effect
 from identify.validation.agreement import Agreement, agreement
 from identify.validation.comparison import SideBySide, compare_axis, position_errors, side_by_side
 from identify.validation.misfit_maps import worst_region
-from identify.validation.tracking import tracking
+from identify.validation.tracking import tracking, unmoved
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
@@ -74,14 +76,23 @@ READING = "reading and preparing the logs"
 
 
 def first_model(
-    logs: GivenLogs, name: str = "machine", catalogue: Catalogue | None = None
+    logs: GivenLogs,
+    name: str = "machine",
+    catalogue: Catalogue | None = None,
+    *,
+    mass: Masses | None = None,
 ) -> MachineModel:
     """A model to begin with, of what the logs show: mass, friction, constant force, hardware.
 
-    Raises InputError where no axis moves, and where the logs do not tell the mass.
+    mass: kg (kg m^2 of a rotary axis) where it is known, of the only axis that moves, or by axis;
+    it is held, and the rest is found beside it. Raises InputError where no log says anything, and
+    where the logs do not tell the mass and it is not given.
     """
     known = load_catalogue() if catalogue is None else catalogue
-    return shown_by(logs_by_name(logs, Role.TRAINING.value), name, known)
+    given = logs_by_name(logs, Role.TRAINING.value)
+    model = shown_by(given, name, known, mass=mass)
+    tell_left_out(unused(model, given))
+    return model
 
 
 @parallel()
@@ -103,13 +114,28 @@ def fit(
     and where nothing can be fitted: an axis that comes to rest within every test function, a force
     that is not a number.
     """
+    parts = _given(model, logs, holdout, test, catalogue)
+    known = Catalogue([]) if catalogue is None else usable(catalogue, parts[0])
+    return _fit(*parts, known, test_function, progress)
+
+
+def _fit(
+    model: MachineModel,
+    logs: Mapping[str, Log],
+    holdout: Mapping[str, Log],
+    test: Mapping[str, Log],
+    known: Catalogue,
+    test_function: float | None,
+    progress: Progress,
+    tried: Collection[Effect] = (),
+) -> FitResult:
+    """As ``fit`` says; tried: effects that are to be tried beside those of the model."""
     progress(READING, 0, 1)
-    model, logs, holdout, test = _given(model, logs, holdout, test, catalogue)
     found, given = datasets(model, logs, holdout, test_function, test), model
-    known = Catalogue([]) if catalogue is None else usable(catalogue, given)
     fits, intervals, refits, held, tested = {}, {}, {}, {}, {}
     for i, (axis, dataset) in enumerate([*found.items()]):
         progress("fitting", i, len(found))
+        dataset = telling_beside(given.axes[axis], dataset, tried)
         found[axis], fits[axis] = dataset, done = _fitted(given.axes[axis], dataset)
         held[axis] = error_if_any(Role.SELECTION, done, dataset)
         tested[axis] = error_if_any(Role.TEST, done, dataset)
@@ -125,7 +151,6 @@ def fit(
 
 def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     """The fit of an axis, and the dataset as it was found with it. Raises InputError."""
-    dataset = telling(dataset, sticks(axis))
     require_residual(axis, dataset)
     dataset, fitted = fit_aligned(axis, dataset)
     dataset, fitted = with_own_noise(fitted, dataset)
@@ -227,17 +252,17 @@ def diagnose(
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
     known = usable(catalogue, model)
-    result = fit(
-        physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
-    )
+    parts = _given(physics_alone(model), logs, holdout, test)
+    result = _fit(*parts, Catalogue([]), test_function, progress, [*known.values()])
     suspects = suspects_of(result.model, result.fits, result.datasets, progress)
-    offered = {axis: suspects.offered(known, axis) for axis in result.fits}
+    told = {a: offered(result.given.axes[a], d, known) for a, d in result.datasets.items()}
+    every = {axis: suspects.offered(known, axis) for axis, known in told.items()}
     body = suspects.body
     if body is None or not body.explains_all:
-        axes = _diagnosed(result.fits, result.datasets, offered, progress)
+        axes = _diagnosed(result.fits, result.datasets, every, progress)
     if body is not None:
         with_it = within(progress, f"with another {body.body}")
-        beside = _diagnosed(body.fits, body.datasets, offered, with_it)
+        beside = _diagnosed(body.fits, body.datasets, every, with_it)
         if body.explains_all or is_better(beside, axes):
             axes = beside
         else:
@@ -257,7 +282,7 @@ def diagnose(
         summaries=summaries,
         next_experiments=plans,
         refits={axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()},
-        not_tried=tuple(name for name in catalogue if name not in known),
+        not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
         body=body,
@@ -309,7 +334,8 @@ def add(
     effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
-    before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
+    parts = _given(model, logs, holdout, test)
+    before = _fit(*parts, Catalogue([]), test_function, progress, [effect])
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
@@ -322,7 +348,8 @@ def add(
         )
     attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     progress("adding", 0, 1)
-    tried = [attempt(before.fits[n], before.datasets[n], effect) for n in open_axes]
+    shown = require_shown(effect, {n: (model.axes[n], before.datasets[n]) for n in open_axes})
+    tried = [attempt(before.fits[n], before.datasets[n], effect) for n in shown]
     best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
     having = [n for n in names if n not in open_axes]
     made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
@@ -471,8 +498,10 @@ def feedforward(
     model, given, *_ = _given(model, logs, catalogue=catalogue)
     before = None if before is None else as_model(before, catalogue)
     simulated = model if machine is None else as_model(machine, catalogue)
-    found = tracking(simulated, model, before, given, progress)
-    return Feedforward(model, before, tuple(given), found)
+    given = dict(given)  # each is read once
+    moved = those_told(given, {name: unmoved(model, log) for name, log in given.items()})
+    found = tracking(simulated, model, before, moved, progress)
+    return Feedforward(model, before, tuple(moved), found)
 
 
 def frequency_response(
@@ -488,9 +517,10 @@ def frequency_response(
     is simulated on the setpoints of the logs, and its response estimated in the same way. Raises
     InputError where no axis moves in all of the logs, or their sample rates differ.
     """
-    given = logs_by_name(logs)
+    given = dict(logs_by_name(logs))  # each is read once
     machine = None if model is None else as_model(model, catalogue)
-    return FrequencyResponse(tuple(given), responses_of(given, machine, progress))
+    kept = those_told(given, {name: shortness(log) for name, log in given.items()})
+    return FrequencyResponse(tuple(kept), responses_of(kept, machine, progress))
 
 
 def on_machine(

@@ -25,8 +25,11 @@ def between(signal: Array, period: float) -> Array:
 
 
 def rate(signal: Array, period: float) -> Array:
-    """Rate (n,) at each sample, per s, from its two neighbours; at the ends from one."""
-    return np.asarray(np.gradient(signal, period))
+    """Rate (n,) at each sample, per s, from its two neighbours; at the ends from one.
+
+    0 of a single sample.
+    """
+    return np.asarray(np.gradient(signal, period)) if len(signal) > 1 else np.zeros_like(signal)
 
 
 def cubic_through(times: Array, values: Array, at: Array) -> Array:
@@ -115,9 +118,9 @@ def stretches(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 def white_noise(signal: Array) -> float:
     """RMS of the white part of a smooth signal (n,): its fourth difference holds little else.
 
-    The fourth difference of white noise is sqrt(70) times as large.
+    The fourth difference of white noise is sqrt(70) times as large. 0 of a signal too short for it.
     """
-    return usual_size(np.diff(signal, 4)) / 70**0.5
+    return usual_size(np.diff(signal, 4)) / 70**0.5 if len(signal) > 4 else 0.0
 
 
 def sliding_products(signal: Array, patterns: Array) -> Array:

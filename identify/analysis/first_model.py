@@ -9,22 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import floor, log10
 
 import numpy as np
 
-from identify.dataset.bodies import bodies_along
+from identify.dataset.bodies import Bodies, bodies_along
 from identify.dataset.coordinates import excitation
-from identify.dataset.given_logs import require_samples
+from identify.dataset.given_logs import is_driven, nothing_told, require_samples, telling_in
 from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, motion_of
 from identify.dataset.prepared_log import stands
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.estimation.evidence import rms
-from twin.checks import moves
-from twin.effect import Excitation, Kind
+from twin.effect import LEAST, MOST, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.logs import Log
+from twin.model.file import storable
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 from twin.signals import Array, stretches
@@ -32,6 +33,7 @@ from twin.signals import Array, stretches
 LENGTHS = (0.1, 0.05, 0.02)  # s, of the test functions: the first that tells the mass
 BLOCKS = 30  # of time, for the scatter of a value
 ROWS = 4 * BLOCKS  # test functions in motion, that tell the values and how sure they are
+Masses = float | Mapping[str, float]  # kg; by axis, or of the only one that moves
 NAMES = ("mass", "coulomb", "viscous", "constant")  # of the first columns; others are of the place
 
 
@@ -67,34 +69,40 @@ class Regression:
         return float(self.gains[at]) if abs(self.t[at]) > sure else 0.0
 
 
-def first_values(motions: Sequence[Motion]) -> FirstValues:
-    """The values that the logs of an axis tell."""
+def first_values(motions: Sequence[Motion], mass: float | None = None) -> FirstValues:
+    """The values that the logs of an axis tell; mass: kg, where it is known."""
     place = _place(motions)
+    if mass is not None:
+        columns, force = _both_ways(*_rows(motions, LENGTHS[0], place))
+        beside = _with_friction(_without(columns, "mass"), force - mass * columns[0])
+        return _values(motions, place, beside, mass)
     for length in LENGTHS:
-        columns, force = _rows(motions, length, place)
-        one_way = 0.8  # mean direction from which nine tenths of the motion go one way
-        if abs(np.mean(np.sign(columns[1]))) > one_way:
-            columns = _without(columns, "constant")  # it would be the friction of that way
+        columns, force = _both_ways(*_rows(motions, length, place))
         found = _with_friction(columns, force)
         # of the force's RMS; below, friction that is not known hides the inertia
         least_inertial = 0.005
         least = least_inertial * float(np.std(force)) / max(float(np.std(columns[0])), 1e-300)
-        mass = found.sure("mass")
-        if mass > least:
-            break
+        if (told := found.sure("mass")) > least:
+            return _values(motions, place, found, told)
     # As it is, its friction would push.
-    against = 0.0 if mass > least else _with_friction(columns, -force).sure("mass")
-    coulomb = found.sure("coulomb")
-    static = _static(motions, found, place)
+    against = _with_friction(columns, -force).sure("mass")
+    unknown = replace(_values(motions, place, found, float(found.gains[0])), mass=None)
+    return replace(unknown, reversed=-against if against > least else 0.0)
+
+
+def _values(
+    motions: Sequence[Motion], place: tuple[float, bool], found: Regression, mass: float
+) -> FirstValues:
+    """With the friction and the constant that a regression found beside a mass, kg."""
+    coulomb, static = found.sure("coulomb"), _static(motions, found, mass, place)
     # times the Coulomb friction, from which static friction is more than a peak's noise
     more = 1.05
     return FirstValues(
-        mass=mass if mass > least else None,
+        mass=mass,
         coulomb=coulomb,
         viscous=found.sure("viscous"),
         constant=found.sure("constant"),
         static=static if static is not None and static > more * coulomb > 0.0 else None,
-        reversed=-against if against > least else 0.0,
     )
 
 
@@ -157,6 +165,13 @@ def _with_friction(columns: Array, force: Array) -> Regression:
     return _regressed(_without(_without(columns, "coulomb"), "viscous"), force)
 
 
+def _both_ways(columns: Array, force: Array) -> tuple[Array, Array]:
+    """Less the constant, where the motion goes one way: it would be the friction of that way."""
+    one_way = 0.8  # mean direction from which nine tenths of the motion go one way
+    straight = abs(np.mean(np.sign(columns[1]))) > one_way
+    return _without(columns, "constant") if straight else columns, force
+
+
 def _without(columns: Array, name: str) -> Array:
     kept = columns.copy()
     kept[NAMES.index(name)] = 0.0
@@ -175,18 +190,22 @@ def _regressed(columns: Array, force: Array) -> Regression:
     variance = np.diag(inverse @ (scores.T @ scores) @ inverse)
     rounding = 1e-9  # of the force: smaller gains of columns of unit size are none
     error = np.sqrt(np.maximum(variance, 0.0)) + rounding * float(np.linalg.norm(force))
+    error = np.maximum(error, np.finfo(float).tiny)  # of no force at all
     return Regression(gains / size, gains / error, rms(left))
 
 
 def _static(
-    motions: Sequence[Motion], found: Regression, place: tuple[float, bool]
+    motions: Sequence[Motion], found: Regression, mass: float, place: tuple[float, bool]
 ) -> float | None:
-    """The friction (N) at which the axis breaks away from rest; None where it seldom does."""
+    """The friction (N) at which the axis breaks away from rest; None where it seldom does.
+
+    mass: kg.
+    """
     smoothed = 5  # blocks, over which the force at rest is averaged before its peak is taken
     needed = []
     for m in motions:
         rest = stands(m)
-        driven = m.net - found.gains[0] * m.acceleration - found.gains[3]
+        driven = m.net - mass * m.acceleration - found.gains[3]
         driven = driven - found.gains[4:] @ _of_place(m.position, place)
         driven = np.convolve(driven, np.ones(smoothed) / smoothed, "same")
         # s at rest before a motion begins from rest
@@ -204,6 +223,7 @@ def first_model(
     name: str,
     catalogue: Catalogue,
     bodies: tuple[str, str] | None = None,
+    mass: Masses | None = None,
 ) -> MachineModel:
     """A model to begin with: of each axis that moves its mass and the simplest friction.
 
@@ -211,9 +231,10 @@ def first_model(
     axis does not break away from rest (``not_determined``). Hardware is what the logs show: travel,
     speed, acceleration and force that were reached, the step and the noise of the encoder. bodies:
     name and text of an MJCF or URDF file, whose joints or fixed tendons are the axes of their
-    names, or of those of their actuators; each log then holds all of them. Raises InputError where
-    no axis moves, where the logs differ in sample rate, and where they do not tell the mass, or
-    lack a joint.
+    names, or of those of their actuators; each log then holds all of them. mass: kg where it is
+    known, by axis, or of the only one that moves; it is held, and the rest is found beside it.
+    Raises InputError where no log says anything, where the logs differ in sample rate, where they
+    do not tell the mass, or lack a joint, and for a mass that no axis can have.
     """
     require_samples(logs)
     rates = sorted({log.sample_rate for log in logs.values()})
@@ -221,31 +242,62 @@ def first_model(
         raise InputError(
             f"the logs are sampled at {', '.join(f'{r:g}' for r in rates)} Hz; give one rate"
         )
-    names = dict.fromkeys(axis for log in logs.values() for axis in log.axes)
+    names = tuple(dict.fromkeys(axis for log in logs.values() for axis in log.axes))
     begun = MachineModel(name, {}, rates[0])
     if bodies is not None:
-        begun = _of_joints(begun, tuple(names), *bodies)
+        begun = _of_joints(begun, names, *bodies)
+    own = begun.axes if mass is None else _held(mass, logs, names, begun)
+    told = {a: telling_in(logs, a, driven=is_driven(own.get(a))) for a in names}
+    if not any(going for going, _ in told.values()):
+        raise nothing_told(names, logs.values(), (silent for _, silent in told.values()))
     taken = {n: bodies_along(begun, log, n) for n, log in logs.items()}
-    axes = {}
-    for axis in names:
-        going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
-        if going:
-            ripples = ripples_of_widest(going.values(), axis)
-            # Long blocks hide an axis that swings within them, and of short ones noise hides more.
-            for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
-                motions = [
-                    motion_of(log, axis, n, (), longest, ripples, taken[n].get(axis))
-                    for n, log in going.items()
-                ]
-                found = first_values(motions)
-                if found.mass is not None:
-                    break
-            constant = next(iter(going.values())).axes[axis].force_constant
-            joint = begun.axes.get(axis)
-            axes[axis] = _first_axis(axis, motions, found, constant, catalogue, joint)
-    if not axes:
-        raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
+    axes = {
+        a: _first_axis(going, a, {n: taken[n].get(a) for n in going}, own.get(a), catalogue)
+        for a, (going, _) in told.items()
+        if going
+    }
     return replace(begun, axes={**begun.axes, **axes})
+
+
+def unused(model: MachineModel, logs: Mapping[str, Log]) -> dict[str, str]:
+    """By name, the logs that say nothing of an axis of a first model, and why."""
+    silent = (telling_in(logs, a, driven=is_driven(own))[1] for a, own in model.axes.items())
+    return {name: why for each in silent for name, why in each.items()}
+
+
+def _held(
+    mass: Masses, logs: Mapping[str, Log], names: Sequence[str], begun: MachineModel
+) -> dict[str, AxisModel]:
+    """The axes whose mass (kg) is given, with it and nothing else. Raises InputError."""
+    if begun.axes:
+        raise InputError(
+            f"the bodies of {begun.mjcf_name} have their mass there; give none beside them"
+        )
+    if not isinstance(mass, Mapping):
+        moving = [a for a in names if telling_in(logs, a, driven=False)[0]]
+        if len(moving) > 1:
+            raise InputError(
+                f"a mass of {mass:g}: {', '.join(moving)} move; give it by axis, as in "
+                f"{moving[0]}={mass:g}"
+            )
+        mass = dict.fromkeys(moving, mass)
+    if unknown := mass.keys() - set(names):
+        raise InputError(
+            f"a mass of axis {', '.join(unknown)}: the logs have {', '.join(names)}; name one of "
+            "them"
+        )
+    kinds = {a: next(log.axes[a].kind for log in logs.values() if a in log.axes) for a in mass}
+    for axis, value in mass.items():
+        if value != 0.0 and not LEAST <= value <= MOST:
+            name, unit = kinds[axis].mass_name, kinds[axis].mass
+            raise InputError(
+                f"axis {axis}: {name} = {value:g} {unit}: give a number from {LEAST:g} to "
+                f"{MOST:g}, in {unit}, or 0 where the motion is imposed"
+            )
+    return {
+        a: AxisModel(float(value), mass_fixed=True, rotary=kinds[a].rotary)
+        for a, value in mass.items()
+    }
 
 
 def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
@@ -272,48 +324,74 @@ def not_determined(axis: AxisModel) -> list[str]:
 
 
 def _first_axis(
+    logs: Mapping[str, Log],
     axis: str,
-    motions: Sequence[Motion],
-    found: FirstValues,
-    force_constant: float | None,
+    bodies: Mapping[str, Bodies | None],
+    own: AxisModel | None,
     catalogue: Catalogue,
-    joint: AxisModel | None,
 ) -> AxisModel:
-    """joint: the axis without effects where it is a joint, whose inertia is known."""
-    test_function = 0.02  # s, over which the acceleration that was reached is averaged
+    """bodies: by log, of a joint. own: with its mass alone where that is known. InputError."""
+    ripples = ripples_of_widest(logs.values(), axis)
+    known = None if own is None or own.joint is not None else own.mass
+    # Long blocks hide an axis that swings within them, and of short ones noise hides more.
+    for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
+        motions = [
+            motion_of(log, axis, n, (), longest, ripples, bodies[n]) for n, log in logs.items()
+        ]
+        found = first_values(motions, known)
+        if found.mass is not None:
+            break
     covered, units = excitation(motions, None), motions[0].units
-    if found.mass is None and joint is None:
-        names = ", ".join(m.name for m in motions)
-        if found.reversed:
-            raise InputError(
-                f"axis {axis}: in {names} force and motion are as if the {units.mass_name} were "
-                f"{found.reversed:.2g} {units.mass}; give the force or the position the sign -1 "
-                "in the import map"
-            )
-        raise InputError(
-            f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
-            "little of the force; give a log with faster changes of speed"
+    if own is None:
+        if found.mass is None:
+            raise _untold(axis, motions, found)
+        own = AxisModel(_shown(found.mass), rotary=units.rotary)
+    constant = next(iter(logs.values())).axes[axis].force_constant
+    hardware = _hardware(motions, covered, 1.0 if constant is None else constant)
+    effects = _first_effects(found, catalogue, covered, units, own.joint is not None)
+    return replace(own, hardware=hardware, effects=effects)
+
+
+def _untold(axis: str, motions: Sequence[Motion], found: FirstValues) -> InputError:
+    """That the motion of an axis does not tell its mass, and what to do."""
+    names, units = ", ".join(m.name for m in motions), motions[0].units
+    if found.reversed:
+        return InputError(
+            f"axis {axis}: in {names} force and motion are as if the {units.mass_name} were "
+            f"{found.reversed:.2g} {units.mass}; give the force or the position the sign -1 "
+            "in the import map"
         )
+    return InputError(
+        f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
+        f"little of the force; give a log with faster changes of speed, or the {units.mass_name} "
+        f"itself, in {units.mass} (--mass), which is then held"
+    )
+
+
+def _hardware(motions: Sequence[Motion], covered: Excitation, force_constant: float) -> Hardware:
+    """What the logs show of it, less what no model's file may hold; force_constant: N/A."""
+    test_function = 0.02  # s, over which the acceleration that was reached is averaged
     reached = max(
         float(np.abs(TestFunction.at_least(test_function, m.period).acceleration(m.velocity)).max())
         for m in motions
     )
     margin = 0.05 * covered.travel  # of the way that was covered, beyond its ends
-    low, high = covered.position_low - margin, covered.position_high + margin
-    hardware = Hardware(
-        travel=(_shown(low), _shown(high)),
-        force_constant=1.0 if force_constant is None else force_constant,
-        force_limit=_shown(2.0 * covered.force_max),
-        encoder_resolution=_shown(covered.resolution),
-        encoder_noise=_shown(max(m.position_noise for m in motions)),
-        velocity=_shown(covered.speed_max),
-        acceleration=_shown(reached),
-        jerk=_shown(reached / test_function),
+    digits = 2 - floor(log10(covered.travel))  # of a hundredth of the way, wherever it lies
+    return storable(
+        Hardware(
+            travel=(
+                round(covered.position_low - margin, digits),
+                round(covered.position_high + margin, digits),
+            ),
+            force_constant=force_constant,
+            force_limit=_shown(2.0 * covered.force_max),
+            encoder_resolution=_shown(covered.resolution),
+            encoder_noise=_shown(max(m.position_noise for m in motions)),
+            velocity=_shown(covered.speed_max),
+            acceleration=_shown(reached),
+            jerk=_shown(reached / test_function),
+        )
     )
-    effects = _first_effects(found, catalogue, covered, units, joint is not None)
-    if joint is not None:
-        return replace(joint, hardware=hardware, effects=effects)
-    return AxisModel(_shown(found.mass or 0.0), hardware, effects, rotary=units.rotary)
 
 
 def _first_effects(

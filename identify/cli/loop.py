@@ -29,6 +29,7 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
+    left_out,
     loaded,
     said_of,
     with_logs,
@@ -195,7 +196,7 @@ def _report(
     after, before, history = result.model, None, result.model.history
     if isinstance(result, workflow.Diagnosis):
         before, history = result.fitted if result.effect else None, result.fitted.history
-    with progress_on_stderr() as progress:
+    with progress_on_stderr() as progress, left_out():  # what says nothing was told already
         known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
     findings = done.findings
     subject = Subject(title, result, history, (), source, machine=known, findings=findings)
@@ -352,14 +353,14 @@ def frf(
     if len(models) > 1 or not paths:
         raise InputError(f"{' '.join(logs)}: give logs (.mcap) and one model (.toml) at most")
     machine = loaded(models[0], effects)[0] if models else None
-    with progress_on_stderr() as progress:
+    with progress_on_stderr() as progress, left_out() as silent:
         recorded = CheckedRecordings(paths)
         result = workflow.frequency_response(recorded, machine, progress=progress)
     if out:
         result.write(out)
     if plot:
         save_picture(result.plot(), plot)
-    return said_of(result, briefly(recorded.findings))
+    return said_of(result, [*briefly(recorded.findings), *silent])
 
 
 @app.command()

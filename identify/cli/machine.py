@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +27,7 @@ from twin.errors import InputError
 from twin.export import find_exporter, format_names
 
 if TYPE_CHECKING:
+    from identify.analysis.first_model import Masses
     from identify.view.replay import Replay
     from twin.parallel import Progress
 
@@ -141,12 +142,20 @@ def new(
         Path | None,
         Option("--mjcf", help="MJCF or URDF file whose joints or tendons are the axes."),
     ] = None,
+    mass: Annotated[
+        list[str] | None,
+        Option(
+            metavar="[AXIS=]NUMBER",
+            help="Moved mass in kg (moment of inertia in kg m^2) where it is known, of an axis "
+            "where several move; it is held, and the rest is found beside it.",
+        ),
+    ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
 
     Example: twin new run.mcap -o model.toml
     """
-    from identify.analysis.first_model import first_model, not_determined
+    from identify.analysis.first_model import first_model, not_determined, unused
     from identify.analysis.joint_signs import misassigned
     from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
@@ -155,7 +164,7 @@ def new(
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read = dict(recorded)
-    model = first_model(read, out.stem, load_catalogue(), bodies)
+    model = first_model(read, out.stem, load_catalogue(), bodies, _masses(mass or ()))
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
@@ -171,7 +180,21 @@ def new(
     text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
-    return Said("\n".join([text, *notes]), answer, [*briefly(recorded.findings), *doubts])
+    silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
+    warnings = [*briefly(recorded.findings), *silent, *doubts]
+    return Said("\n".join([text, *notes]), answer, warnings)
+
+
+def _masses(given: Sequence[str]) -> Masses | None:
+    """The masses of axes as they were typed: a number alone, or "x=2.5"."""
+    try:
+        masses = {a: float(value) for a, _, value in (text.rpartition("=") for text in given)}
+    except ValueError:
+        raise InputError(
+            f"--mass {' '.join(given)}: give a number in kg (kg m^2 of a rotary axis), as 2.5, or "
+            "as x=2.5 where several axes move"
+        ) from None
+    return masses[""] if masses.keys() == {""} else masses or None
 
 
 @app.command()

@@ -50,11 +50,6 @@ class Dataset:
     test: tuple[PreparedLog, ...] = ()
 
     @property
-    def still(self) -> tuple[str, ...]:
-        """Names of the logs that were left out."""
-        return tuple(self.left_out)
-
-    @property
     def beyond(self) -> dict[str, float]:
         """Part of each log, 0..1 by name, that lies where no training log has been."""
         others = (*self.selection, *self.test)

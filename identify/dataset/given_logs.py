@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from identify.dataset.dataset import Role
-from identify.dataset.motion import SHORTEST_LOG, other_axes
+from identify.dataset.motion import SHORTEST_LOG, other_axes, shortest_log
 from twin.checks import moves
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
@@ -66,24 +66,62 @@ def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> Non
             )
 
 
-def moving_in(
-    logs: Mapping[str, Log], axis: str, machine: Sequence[str] = ()
-) -> tuple[dict[str, Log], list[str]]:
-    """The logs in which the axis moves, by name, and the names of those in which it does not.
+def is_driven(axis: AxisModel | None) -> bool:
+    """Whether an axis, None where nothing is known of it, tells its mass by a force alone."""
+    return axis is None or axis.is_imposed or not axis.mass_fixed
 
-    machine: the axes of the machine. Raises InputError where what is read is not a number.
+
+def shortness(log: Log) -> str | None:
+    """That a log is too short for any motion to be told by it; None where it is not."""
+    least = shortest_log(log.period)
+    if len(log) * log.period >= least:
+        return None
+    return (
+        f"it lasts {len(log) * log.period:.3g} s, and identification needs {least:.3g} s at "
+        f"{log.sample_rate:g} Hz; give a longer one"
+    )
+
+
+def silence(log: Log, axis: str, *, driven: bool = True) -> str | None:
+    """Why a log says nothing of one of its axes, and what to give; None where it says something.
+
+    driven: whether there must be a force, without which no mass shows; of a mass that is held a
+    motion without force shows the friction.
+    """
+    if short := shortness(log):
+        return short
+    if not moves(log, axis):
+        return f"axis {axis} stands still in it; give one in which it moves"
+    if driven and not log.axes[axis].force.any():
+        units = log.axes[axis].kind
+        return (
+            f"the {units.words('force')} of axis {axis} is 0 {units.force} throughout; give one "
+            f"with that channel connected, or hold the {units.mass_name} (fixed) where the axis "
+            "coasts"
+        )
+    return None
+
+
+def telling_in(
+    logs: Mapping[str, Log], axis: str, machine: Sequence[str] = (), *, driven: bool = True
+) -> tuple[dict[str, Log], dict[str, str]]:
+    """The logs that say something of an axis, by name, and why others that hold it say nothing.
+
+    machine: the axes of the machine. driven: as ``silence`` has it. Raises InputError where what is
+    read is not a number.
     """
     held = {name: log for name, log in logs.items() if axis in log.axes}
     for name, log in held.items():
         _require_numbers(name, log, axis, "position", log.axes[axis].position)
-    going = {name: log for name, log in held.items() if moves(log, axis)}
+    why = {name: silence(log, axis, driven=driven) for name, log in held.items()}
+    going = {name: log for name, log in held.items() if why[name] is None}
     for name, log in going.items():
         _require_numbers(name, log, axis, "force", log.axes[axis].force)
         for signal in filter(log.axes[axis].columns.__contains__, READ_IF_LOGGED):
             _require_numbers(name, log, axis, signal, log.axes[axis].columns[signal])
         for other in other_axes(log, axis, machine):
             _require_numbers(name, log, other, "position", log.axes[other].position)
-    return going, [name for name in held if name not in going]
+    return going, {name: reason for name, reason in why.items() if reason is not None}
 
 
 def require_moving(axis: str, moving: Collection[str]) -> None:
@@ -92,21 +130,23 @@ def require_moving(axis: str, moving: Collection[str]) -> None:
         raise InputError(f"axis {axis} does not move in the logs; give a log in which it does")
 
 
-def nothing_moves(axes: Iterable[str], logs: Collection[Log]) -> InputError:
-    """Why no axis of a model moves in any training log, and what to do."""
+def nothing_told(
+    axes: Collection[str], logs: Collection[Log], silent: Iterable[Mapping[str, str]]
+) -> InputError:
+    """Why no training log says anything of an axis of a model, and what to do.
+
+    silent: of each axis of the model why logs say nothing of it, by name.
+    """
     known = sorted({a for log in logs for a in log.axes})
-    longest = max((len(log) * log.period for log in logs), default=0.0)
-    said = f"no axis of the model ({', '.join(axes)})"
+    names = ", ".join(axes)
     if not set(axes) & set(known):
         return InputError(
-            f"{said} is in the logs, which have {', '.join(known)}; name the axes alike"
+            f"no axis of the model ({names}) is in the logs, which have {', '.join(known)}; name "
+            "the axes alike"
         )
-    if longest < SHORTEST_LOG:
-        return InputError(
-            f"{said} moves for long enough: the logs last {longest:.3g} s at most, identification "
-            f"needs {SHORTEST_LOG:g} s; record longer"
-        )
-    return InputError(f"{said} moves in the logs; give a log in which one moves")
+    first, *others = (f"{name}: {why}" for own in silent for name, why in own.items())
+    more = f" ({len(others)} more say nothing either)" if others else ""
+    return InputError(f"no training log says anything of axis {names}; {first}{more}")
 
 
 def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array) -> None:

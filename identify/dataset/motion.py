@@ -387,7 +387,7 @@ def motion_of(
     if axis not in log.axes:
         raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
     readings = log.axes[axis].position
-    least = max(SHORTEST_LOG, LEAST_BLOCKS**2 * log.period)
+    least = shortest_log(log.period)
     if len(log) * log.period < least:
         raise InputError(
             f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
@@ -426,6 +426,11 @@ def motion_of(
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(whole)),
     )
+
+
+def shortest_log(period: float) -> float:
+    """Least length (s) of a log for identification, of samples of a period (s)."""
+    return max(SHORTEST_LOG, LEAST_BLOCKS**2 * period)
 
 
 @lru_cache(maxsize=1)  # the axes of a log share it

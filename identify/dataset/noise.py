@@ -108,18 +108,26 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     top = HALF if motion.velocity_weight else top
     band = (frequency > min(first, beside / dt)) & (frequency < top / dt)
     force, reading = map(float, fitted_levels(np.stack([half, bend], axis=1)[band], power[band]))
+    # A log without noise has the rounding of its numbers still.
+    numbers = _rounding_of(motion.force, dt)
+    force, reading = max(force, numbers), max(reading, _rounding_of(motion.position, dt))
     # Rounding is white in the mean alone: where it has less in the band, it has more below it.
     plain = max(reading, white_rounding(motion.resolution, dt))
     # times the reading's noise where the band begins; above it the force's noise shows
     most = max(force, 3.0 * plain * float(bend[band][0]))
     if force < most:  # by as much as the motor makes of its command
         made, asked = (np.mean(u**2) for u in (actual_force(axis, motion), motion.raw[1]))
-        force = motion.command_noise * float(made / asked if asked else 1.0)
+        force = max(motion.command_noise * float(made / asked if asked else 1.0), numbers)
     more, scatter = _folded(motion, frequency[band], power[band], half[band], bend[band])
     # 2 bins that hold the slow motion; a dip leaves a quarter of what is folded, rounding a 20th
     if float((power / half)[2 : np.flatnonzero(band)[0]].min(initial=np.inf)) < 0.1 * more:
         more = scatter = 0.0
     return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
+
+
+def _rounding_of(signal: Array, period: float) -> float:
+    """Power, its unit^2/Hz, one-sided, of the rounding of a signal (n,) to the log's numbers."""
+    return white_rounding(float(np.spacing(np.abs(signal).max())), period)
 
 
 def _raw_residual(axis: AxisModel, motion: Motion) -> Array:

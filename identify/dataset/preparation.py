@@ -18,21 +18,26 @@ from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
     Given,
-    moving_in,
-    nothing_moves,
+    is_driven,
+    nothing_told,
     require_apart,
     require_one_kind,
     require_samples,
+    telling_in,
 )
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
-from identify.dataset.prepared_log import PreparedLog, moving
+from identify.dataset.prepared_log import PreparedLog, independent, moving
 from identify.dataset.readings import noise_of_most, ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
+from twin.errors import InputError
 from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.parallel import spread
 from twin.threads import trim_memory
+
+TURN = 2.0 * np.pi  # rad
+LONGER = "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
 
 LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 
@@ -68,19 +73,21 @@ def _prepared(
     require_apart(given)
     bodies = {n: bodies_along(model, log, n) for logs in given.values() for n, log in logs.items()}
     out: dict[str, Dataset] = {}
+    unused: list[dict[str, str]] = []
     for name, axis in model.axes.items():
         for logs in given.values():
             require_one_kind(logs, name, axis)
-        found = {role: moving_in(logs, name, tuple(model.axes)) for role, logs in given.items()}
-        going = {role: moving for role, (moving, _) in found.items()}
+        driven, machine = is_driven(axis), tuple(model.axes)
+        found = {role: telling_in(g, name, machine, driven=driven) for role, g in given.items()}
+        going = {role: telling for role, (telling, _) in found.items()}
         if going[Role.TRAINING]:
-            why = f"axis {name} stands still in it; give one in which it moves"
-            still = {log: why for _, names in found.values() for log in names}
+            silent = {log: why for _, reasons in found.values() for log, why in reasons.items()}
             own = {log: along[name] for log, along in bodies.items() if name in along}
-            out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=still)
+            out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=silent)
             out[name].forget()  # the next axis needs the memory
+        unused.append(found[Role.TRAINING][1])
     if not out:
-        raise nothing_moves(model.axes, given[Role.TRAINING].values())
+        raise nothing_told(model.axes, given[Role.TRAINING].values(), unused)
     return out
 
 
@@ -142,9 +149,12 @@ def _within_reach(
     """Logs that test a fit, where its logs have been.
 
     Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
-    where they have little in common with the training logs.
+    where they have little in common with the training logs, and of a shaft that turned round in
+    these: after a whole turn it is at the same place again.
     """
     low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
+    if fit[0].units.rotary and high - low >= TURN:
+        return tuple(spread(partial(PreparedLog.of, length=length), motions))
     # 0.05 of the range of the training logs, by which a log of another role may exceed it
     margin = 0.05 * (high - low)
     reach = (low - margin, high + margin)
@@ -188,12 +198,11 @@ def _motions(
     return tuple([*islice(made, len(some))] for some in parts)
 
 
-def telling(dataset: Dataset, sticks: bool) -> Dataset:
+def telling(dataset: Dataset, sticks: bool, parameters: int = 0) -> Dataset:
     """The dataset less the logs without a test function that counts; each is told in one line.
 
     sticks: whether the axis has static friction, whose force at rest the motion does not determine.
-    The training logs stay where none of them says anything: no fit can begin then, and that is its
-    error to tell.
+    parameters: how many are to be fitted. Raises InputError as ``require_told`` does.
     """
     silent = {
         log.motion.name: _why(log, dataset.axis)
@@ -201,23 +210,65 @@ def telling(dataset: Dataset, sticks: bool) -> Dataset:
         for log in dataset.having(role)
         if not moving([log], sticks).any()
     }
-    left_out = {**dataset.left_out, **silent}
-    for name, why in left_out.items():
-        LOGGER.warning("%s is left out: %s", name, why)
     fit, holdout, test = (
         tuple(log for log in dataset.having(role) if log.motion.name not in silent) for role in Role
     )
-    return replace(
-        dataset, training=fit or dataset.training, selection=holdout, test=test, left_out=left_out
-    )
+    require_told(dataset, sticks, parameters)
+    left_out = {**dataset.left_out, **silent}
+    tell_left_out(left_out)
+    return replace(dataset, training=fit, selection=holdout, test=test, left_out=left_out)
+
+
+def tell_left_out(logs: Mapping[str, str]) -> None:
+    """Say which logs are left out, and why, a line each; logs: the reasons by name."""
+    for name, why in logs.items():
+        LOGGER.warning("%s is left out: %s", name, why)
+
+
+def those_told(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:
+    """The logs without a reason to leave them out; the others are told. InputError where all are.
+
+    why: by name.
+    """
+    left_out = {name: reason for name, reason in why.items() if reason is not None}
+    if len(left_out) == len(logs):
+        raise InputError(": ".join(next(iter(left_out.items()))))
+    tell_left_out(left_out)
+    return {name: log for name, log in logs.items() if name not in left_out}
+
+
+def is_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> bool:
+    """Whether the training logs say more than so many numbers.
+
+    A fit of as many parameters would leave nothing, and prove nothing. sticks: as ``telling`` has
+    it.
+    """
+    return independent(dataset.training, sticks) > parameters
+
+
+def require_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> None:
+    """Raise InputError where they do not."""
+    if is_told(dataset, sticks, parameters):
+        return
+    logs, told = dataset.training, independent(dataset.training, sticks)
+    why = _why(logs[0], dataset.axis)
+    if told:
+        why = (
+            f"axis {dataset.axis} moves throughout {told} of the test functions of "
+            f"{dataset.test_function_length:g} s that share no instant, too few for {parameters} "
+            f"free parameters; {LONGER}"
+        )
+    raise InputError(f"{', '.join(log.motion.name for log in logs)}: {why}")
 
 
 def _why(log: PreparedLog, axis: str) -> str:
     """Why a log has no test function that counts, and what to give instead."""
+    length = f"{log.test_function.length:g} s"
+    if not len(log):
+        return f"it is shorter than a test function of {length}; {LONGER}"
     if not log.reached.any():
         return f"axis {axis} is nowhere where a training log has been; give one on the same travel"
     return (
-        f"axis {axis} comes to rest within every test function of {log.test_function.length:g} s, "
-        "and at rest its friction is unknown; give a log in which it moves for longer at a time, "
-        "or a shorter --test-function (s)"
+        f"axis {axis} comes to rest within every test function of {length}, and at rest its "
+        f"friction is unknown; {LONGER}"
     )

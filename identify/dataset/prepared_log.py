@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.drive import added_on_blocks, parts_of
 from identify.dataset.motion import REST_SPEED, Motion
-from identify.dataset.test_function import TestFunction
+from identify.dataset.test_function import OVERLAP, TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
 from twin.effect import Kind
@@ -178,6 +178,12 @@ def last_direction(velocity: Array) -> Array:
     direction = np.where(at_rest(velocity), 0.0, np.sign(velocity))
     index = np.maximum.accumulate(np.where(direction != 0.0, np.arange(len(direction)), 0))
     return np.asarray(direction[index])
+
+
+def independent(logs: Sequence[PreparedLog], sticks: bool) -> int:
+    """How many test functions that carry information share no instant, about."""
+    kept = (np.flatnonzero(moving([log], sticks)) for log in logs)
+    return sum(len(np.unique(each // OVERLAP)) for each in kept)
 
 
 def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:

@@ -79,10 +79,15 @@ def fitted_levels(shapes: Array, power: Array) -> Array:
     Errors of an estimated power are in proportion to it (P. Whittle, "Estimation and information in
     stationary time series", Ark. Mat. 2, 1953), so that relative errors are fitted. A frequency
     above the fit, such as a resonance, has the less weight the higher it is: the first fit is the
-    smallest power at this or any higher frequency, as noise of such shapes never falls.
+    smallest power at this or any higher frequency, as noise of such shapes never falls. Zero, where
+    there is no power: what is far below the highest is rounding, and counts as that.
     """
-    least = np.maximum(np.minimum.accumulate(power[::-1])[::-1], np.finfo(float).tiny)
-    model, levels = least, np.zeros(shapes.shape[1])
+    levels = np.zeros(shapes.shape[1])
+    rounding = np.finfo(float).eps ** 2 * float(power.max(initial=0.0))
+    if rounding < np.sqrt(np.finfo(float).tiny):  # whose square, by which it is divided, is none
+        return levels
+    power = np.maximum(power, rounding)
+    model = least = np.minimum.accumulate(power[::-1])[::-1]
     rounds, resting = 12, 1e-4  # of least squares, at most; the relative change of levels that rest
     for _ in range(rounds):
         # A frequency whose log of power over fit is 0.5 has half its weight

@@ -18,8 +18,9 @@ BETTER = 0.99  # of an error, from which another one is hardly better
 
 
 def rms(values: Array) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+    """Root of the mean square; infinite of a motion without end, no number of no values."""
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
 def effective_samples(residual: Array) -> float:

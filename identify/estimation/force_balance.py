@@ -157,15 +157,8 @@ def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 
 
 def require_residual(axis: AxisModel, dataset: Dataset) -> None:
-    """Raise InputError where no test function is usable, or the residual is not a number."""
+    """Raise InputError where the residual is not a number in a test function that counts."""
     kept = moving(dataset.training, sticks(axis))
-    if not kept.any():
-        raise InputError(
-            f"axis {dataset.axis} comes to rest within every test function of "
-            f"{dataset.test_function_length:g} s of {_names(dataset)}, and at rest its friction is "
-            "unknown; give a log in which it moves for longer at a time, or a shorter "
-            "--test-function (s)"
-        )
     with np.errstate(all="ignore"):
         require_finite(residual(axis, dataset.training)[kept], dataset)
 
@@ -173,15 +166,12 @@ def require_residual(axis: AxisModel, dataset: Dataset) -> None:
 def require_finite(left: Array, dataset: Dataset) -> None:
     """Raise InputError where a residual (n,) N of the test functions that count is not a number."""
     if bad := np.count_nonzero(~np.isfinite(left)):
+        names = ", ".join(log.motion.name for log in dataset.training)
         raise InputError(
             f"axis {dataset.axis}: the force of the model is not a finite number in {bad} of "
-            f"{len(left)} test functions of {_names(dataset)}; check the values of its effects, "
+            f"{len(left)} test functions of {names}; check the values of its effects, "
             "or leave them out to begin with their start values"
         )
-
-
-def _names(dataset: Dataset) -> str:
-    return ", ".join(log.motion.name for log in dataset.training)
 
 
 def group_of(axis: AxisModel, effect: str) -> AxisModel:

@@ -20,14 +20,18 @@ from enum import Enum
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from identify.dataset.prepared_log import scale_of
 from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
 from identify.estimation.fit import Fit, is_linear
 from identify.estimation.force_balance import STEP, changes
 from identify.estimation.least_squares import ROUNDING
 from identify.rules import RULE
+from twin.effect import Parameter
 from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
+from twin.model.units import Scale, has_size
 from twin.signals import Array
 
 INSEPARABLE = 0.9999  # correlation of two estimates from which the data cannot separate them
@@ -115,10 +119,36 @@ def _undetermined(fit: Fit, half: Array) -> dict[str, NoInterval]:
     """Why parameters have none of their own, however good the model is."""
     where = fit.scaling.where
     out: dict[str, NoInterval] = {label: Inseparable(o) for label, o in inseparable(fit).items()}
-    out |= {c.label: NotExcited() for c, w in zip(where, half, strict=True) if not w < np.inf}
+    shown = _shown(fit, half)
+    out |= {c.label: NotExcited() for c, each in zip(where, shown, strict=True) if not each}
     asked = [j for j, c in enumerate(where) if c.label not in out]
     sides = open_sides(fit, [where[j] for j in asked], half[asked])
-    return out | {label: OpenSided(side) for label, side in sides.items()}
+    out |= {label: OpenSided(side) for label, side in sides.items()}
+    scale, values = scale_of(fit.logs), read(fit.axis, where).tolist()
+    return out | {
+        c.label: NotExcited()
+        for c, width, value in zip(where, half, values, strict=True)
+        if c.label not in out and width > _widest(c.parameter, value, scale)
+    }
+
+
+def _shown(fit: Fit, half: Array) -> NDArray[np.bool_]:
+    """Which parameters (k,) make a force beyond rounding where they are as large as the machine."""
+    scale = scale_of(fit.logs)
+    sizes = [_size(c.parameter, scale) for c in fit.scaling.where]
+    with np.errstate(invalid="ignore"):  # of no force at all
+        force = np.sqrt(np.mean(fit.jacobian**2, axis=0)) * sizes
+    return np.asarray((half < np.inf) & (force > np.sqrt(np.finfo(float).eps) * scale.force))
+
+
+def _size(p: Parameter, scale: Scale) -> float:
+    """What alone would take the whole force, or all of the travel; infinite where there is none."""
+    return scale.size(p.unit) if has_size(p.unit) else np.inf
+
+
+def _widest(p: Parameter, value: float, scale: Scale) -> float:
+    """Half the width of an interval, in the parameter's unit, from which it tells nothing."""
+    return 10.0 * max(abs(value), _size(p, scale))
 
 
 def intervals_to_keep(fit: Fit, found: Sequence[Estimate]) -> AxisIntervals:

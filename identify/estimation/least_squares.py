@@ -54,16 +54,18 @@ def minimise(
     low, high = bounds
     x = np.clip(start, low, high)
     force = residual(x)
-    cost = float(force @ force)
+    cost = _cost(force)
     damping, most_damping = first_damping, 1.0 / np.sqrt(EXACT)
     if not np.isfinite(cost):
         return Solution(x, False)
     columns, exact = jacobian(x), True
     for _ in range(most_evaluations):
         step = _step(columns, force, damping, x, bounds)
+        if not np.isfinite(step).all():
+            return Solution(x, False)
         moved = np.clip(x + step, low, high)
         trial = residual(moved)
-        trial_cost = float(trial @ trial)
+        trial_cost = _cost(trial)
         if trial_cost <= cost:
             promised = cost - _cost(force + columns @ (moved - x))
             fall = 1.0 - trial_cost / cost if cost > 0.0 else 0.0
@@ -92,7 +94,9 @@ def minimise(
 
 
 def _cost(force: Array) -> float:
-    return float(force @ force)
+    """Sum of squares; infinite, or no number, where that of a motion without end is."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(force @ force)
 
 
 def _follow(columns: Array, step: Array, change: Array) -> None:
@@ -114,7 +118,10 @@ def _follow(columns: Array, step: Array, change: Array) -> None:
 def _step(
     columns: Array, force: Array, damping: float, x: Array, bounds: tuple[Array, Array]
 ) -> Array:
-    gradient, normal = columns.T @ force, columns.T @ columns
+    with np.errstate(over="ignore", invalid="ignore"):
+        gradient, normal = columns.T @ force, columns.T @ columns
+    if not (np.isfinite(gradient).all() and np.isfinite(normal).all()):
+        return np.full(len(gradient), np.nan)
     size = np.sqrt(np.diag(normal))
     held = ((x <= bounds[0]) & (gradient > 0)) | ((x >= bounds[1]) & (gradient < 0))
     free = ~held & (size > 0)

@@ -167,9 +167,9 @@ class _Problem:
         As much as that error; where it is coloured it holds fewer samples, and counts for less.
         """
         error = np.concatenate(self._errors(internal))
-        if np.isfinite(error).all():
+        if np.isfinite(size := rms(error)):
             samples = len(error) if white else effective_samples(error)
-            self.weight = rms(error) * np.sqrt(len(error) / samples)
+            self.weight = size * np.sqrt(len(error) / samples)
 
     def around(self, rng: np.random.Generator) -> Array:
         """A place around the start."""

@@ -12,6 +12,7 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.dataset.test_function import require_test_function
 from identify.estimation.alignment import fit_aligned
+from identify.estimation.offered import offered, require_shown, telling_beside
 from identify.estimation.variable_projection import usable
 from identify.experiment_design.candidate_experiments import NotRun, proposals
 from identify.experiment_design.discrimination import (
@@ -114,7 +115,7 @@ def plan(
         require_test_function(test_function, duration)
     catalogue = usable(catalogue, model)
     progress("preparing the logs and the rivals", 0, 1)
-    dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function)
+    dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function, catalogue)
     arena = _arena(model, dataset, bool(logs), between, catalogue, test_function, progress)
     effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
     verified = 6  # experiments at most that are judged again by full refits
@@ -206,6 +207,7 @@ def _dataset(
     between: Sequence[Rival],
     axis: str | None,
     test_function: float | None,
+    catalogue: Catalogue,
 ) -> Dataset:
     """The dataset of the axis to be explained; of a simulated log where there are no logs."""
     if not logs:
@@ -216,7 +218,12 @@ def _dataset(
     name = axis or differing_axis(between, model)
     if axis is not None:
         require_moving(axis, found)
-    return found[name] if name in found else next(iter(found.values()))
+    dataset = found[name] if name in found else next(iter(found.values()))
+    own, asked = model.axes[dataset.axis], [r for r in between if isinstance(r, Effect)]
+    dataset = telling_beside(own, dataset, asked if between else catalogue.values())
+    for effect in asked:
+        require_shown(effect, {dataset.axis: (own, dataset)})
+    return dataset
 
 
 def _arena(
@@ -231,7 +238,8 @@ def _arena(
     if between:
         known = explained(between, model, dataset, recorded)
     elif recorded:
-        found = diagnose_axis(base, dataset, catalogue, within(progress, "diagnosis"))
+        told = offered(own, dataset, catalogue)
+        found = diagnose_axis(base, dataset, told, within(progress, "diagnosis"))
         rivals = _rivals(found)
         if found.best is not None and len(rivals) < 2 <= len(found.ranking):
             # Of one that promised little only a linear step was taken: it is fitted now.

@@ -77,7 +77,9 @@ def fit_text(result: FitResult) -> str:
     for axis in result.fits:
         first, *others = fit_in_words(result, axis)
         lines += [first, *(f"  {line}" for line in others), *_estimates(result, axis)]
-    lines += [f"axis {axis}: not fitted, as it moves in no log" for axis in result.not_fitted]
+    lines += [
+        f"axis {axis}: not fitted, as no log says anything of it" for axis in result.not_fitted
+    ]
     return "\n".join(lines)
 
 

@@ -14,6 +14,7 @@ from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
 from identify.estimation.fit import Errors, Fit, error_if_any, error_in
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
+from identify.estimation.offered import NotTried
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.links import WrongBody, corrected
@@ -54,13 +55,13 @@ class FitResult(Printed):
     refits: Mapping[str, Refit]
 
     @property
-    def left_out(self) -> Mapping[str, tuple[str, ...]]:
-        """By axis, the logs in which it stands still, and which were left out of its fit."""
-        return {axis: dataset.still for axis, dataset in self.datasets.items()}
+    def left_out(self) -> Mapping[str, Mapping[str, str]]:
+        """By axis, the logs that say nothing of it, with why."""
+        return {axis: dataset.left_out for axis, dataset in self.datasets.items()}
 
     @property
     def not_fitted(self) -> tuple[str, ...]:
-        """Axes of the model that move in no log."""
+        """Axes of the model of which no training log says anything."""
         return tuple(axis for axis in self.model.axes if axis not in self.fits)
 
 
@@ -194,8 +195,8 @@ class Diagnosis(Pictured):
 
     fitted: the model with the values of the fit before anything was found. summaries: of each axis.
     next_experiments: for an axis whose diagnosis is ambiguous, the experiment that decides.
-    refits: what fitting changed of the given model, by axis. not_tried: effects of the catalogue
-    that depend on the other axis, on a machine with more than two axes. not_planned: for an
+    refits: what fitting changed of the given model, by axis. not_tried: by axis, effects of the
+    catalogue that it lacks and that could not be tried on it, and why. not_planned: for an
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
     with a remainder, where that is largest. body: of a mechanism, one whose inertia is not that of
     its file; the diagnoses are those with it as it was found.
@@ -207,7 +208,7 @@ class Diagnosis(Pictured):
     summaries: Mapping[str, AxisSummary]
     next_experiments: Mapping[str, Plan] = field(default_factory=dict)
     refits: Mapping[str, Refit] = field(default_factory=dict)
-    not_tried: tuple[str, ...] = ()
+    not_tried: Mapping[str, Mapping[str, NotTried]] = field(default_factory=dict)
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
     body: WrongBody | None = None

@@ -13,7 +13,9 @@ from functools import reduce
 
 import numpy as np
 
+from identify.dataset.given_logs import shortness
 from identify.estimation.evidence import rms
+from twin.checks import moves
 from twin.core.loop import POSITION_COLUMN, Controller
 from twin.effect import Kind
 from twin.experiments.trajectory import Setpoint
@@ -64,14 +66,15 @@ def tracking(
     logs: Mapping[str, Log],
     progress: Progress = silent,
 ) -> dict[str, AxisTracking]:
-    """By axis the tracking errors of a machine under the feedforward of a model of it.
+    """By axis that moves the tracking errors of a machine under the feedforward of a model of it.
 
-    gains: of the effects that the model before lacks, of all where there is none. Raises InputError
-    for an axis that the model before lacks, CannotRun where the machine cannot be simulated.
+    logs: in each of which an axis is moved (``unmoved``). gains: of the effects that the model
+    before lacks, of all where there is none. Raises InputError for an axis that the model before
+    lacks, CannotRun where the machine cannot be simulated.
     """
     machine.require_mass()
     motions = [_motion(model, log) for log in logs.values()]
-    names = [a for a in model.axes if any(np.ptp(m.position[:, _at(model, a)]) for m in motions)]
+    names = [a for a in model.axes if any(_is_moved(log, a) for log in logs.values())]
     variants: dict[tuple[str, str], MachineModel] = {}
     for name in names:
         axis, earlier = model.axes[name], before.axis(name) if before else None
@@ -93,6 +96,23 @@ def tracking(
         )
         for a in names
     }
+
+
+def unmoved(model: MachineModel, log: Log) -> str | None:
+    """Why a log has no motion for the axes of a model to follow; None where it has."""
+    if short := shortness(log):
+        return short
+    if any(_is_moved(log, axis) for axis in model.axes):
+        return None
+    return f"no axis of the model ({', '.join(model.axes)}) moves in it; give one in which one does"
+
+
+def _is_moved(log: Log, axis: str) -> bool:
+    """Whether an axis of a log is moved: its setpoint where it has one, else the axis."""
+    if axis not in log.axes:
+        return False
+    wanted = log.axes[axis].columns.get("setpoint_position")
+    return moves(log, axis) if wanted is None else bool(np.ptp(wanted))
 
 
 def _at(model: MachineModel, axis: str) -> int:

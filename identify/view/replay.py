@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.preparation import datasets, telling
+from identify.dataset.preparation import datasets, is_told, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.alignment import aligned
 from identify.estimation.force_balance import effect_forces, unbalanced
@@ -107,8 +107,10 @@ def replay(model: MachineModel | None, log: Log, name: str) -> Replay:
             f"{name}: has the axes {', '.join(log.axes)}, the model {', '.join(model.axes)}; "
             "give the model of this machine, or none"
         )
+    found = datasets(model, {name: log}, {})
+    told = {a: d for a, d in found.items() if is_told(d, sticks(model.axes[a]))}
     parts = {}
-    for axis, dataset in datasets(model, {name: log}, {}).items():
+    for axis, dataset in (told or found).items():
         own = model.axes[axis]
         parts[axis] = aligned(own, telling(dataset, sticks(own))).training[0]
     return _replay(model, log, name, parts)
@@ -125,7 +127,7 @@ def _replay(model: MachineModel, log: Log, name: str, parts: Mapping[str, Prepar
         for axis, own in model.axes.items()
         if axis in log.axes
     }
-    still = [f"axis {a} stands still: there is nothing to compare" for a in axes if a not in parts]
+    still = [f"axis {a}: the log has nothing of it to compare" for a in axes if a not in parts]
     notes = still if parts else []
     if parts and run is None:
         notes.append("the motion is imposed, so that the model has none of its own")

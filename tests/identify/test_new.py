@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import twin
+from cli_runs import refusal, twin
 from scipy.signal import butter, cont2discrete, lfilter
 
+from identify import workflow
 from identify.analysis.first_model import first_model, not_determined
+from identify.workflow import fit
 from twin.checks import Fault, check_log
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
-from twin.logs import ROTARY_UNITS, AxisLog, Log
-from twin.model.file import load_model
+from twin.logs import ROTARY_UNITS, AxisLog, Log, write_log
+from twin.logs.log import LINEAR_UNITS
+from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel
 
 CATALOGUE = load_catalogue()
@@ -118,16 +123,116 @@ def test_a_force_that_one_way_alone_shows_is_friction_and_no_constant():
     assert found["Fc"] == pytest.approx(COULOMB, rel=0.05)
 
 
-def test_logs_that_tell_no_mass_stand_still_or_differ_in_rate_are_refused():
+def slow(units=LINEAR_UNITS) -> Log:
+    """A motion of which the inertia makes next to nothing of the force."""
     t = np.arange(15_000) / 1000.0
     v = 0.025 * np.cos(0.5 * t) + 0.007 * np.cos(0.35 * t + 1.0)
     x = np.cumsum(v) / 1000.0 + 1e-8 * np.random.default_rng(1).standard_normal(len(t))
-    slow = Log(1000.0, {"a": AxisLog({"position": x, "force": 1.5 * np.sign(v) + 40.0 * v})})
+    columns = {"position": x, "force": 1.5 * np.sign(v) + 40.0 * v}
+    return Log(1000.0, {"a": AxisLog(columns, units)})
+
+
+@pytest.mark.parametrize(("units", "name"), [(LINEAR_UNITS, "mass"), (ROTARY_UNITS, "inertia")])
+def test_a_mass_that_the_logs_do_not_tell_is_given_and_held(tmp_path, units, name):
+    write_log(slow(units), tmp_path / "run.mcap")
+    told = refusal("new", "run.mcap", "-o", "m.toml", folder=tmp_path)
+    unit = "kg m^2" if name == "inertia" else "kg"
+    assert f"or the {name} itself, in {unit} (--mass), which is then held" in told
+    for given in ("3.25", "a=3.25"):
+        done = twin("new", "run.mcap", "-o", "m.toml", "--mass", given, folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        axis = load_model(tmp_path / "m.toml").axes["a"]
+        assert (axis.mass, axis.mass_fixed, axis.rotary) == (3.25, True, name == "inertia")
+        assert axis.friction.values["Fc"] == pytest.approx(1.5, rel=0.01)
+        assert axis.friction.values["sigma2"] == pytest.approx(40.0, rel=0.01)
+    assert workflow.first_model([slow(units)], mass=3.25).axes["a"] == axis
+    assert fit(load_model(tmp_path / "m.toml"), slow(units)).model.axes["a"].mass == 3.25
+
+
+def test_the_rest_is_found_beside_a_given_mass_and_a_coasting_axis_shows_it():
+    """A mass that is not the machine's leaves its friction as it is, in a motion both ways."""
+    found = first_model({"l": drive()}, "m", CATALOGUE, mass={"a": 2.0}).axes["a"]
+    assert (found.mass, found.mass_fixed) == (2.0, True)
+    assert found.friction.values["Fc"] == pytest.approx(COULOMB, rel=0.1)
+    coasts = {"l": Log(1000.0, {"a": AxisLog(
+        {"position": np.cumsum(np.maximum(1.0 - 0.5 * T, 0.0)) / 1000.0, "force": 0.0 * T}
+    )})}  # fmt: skip
+    with pytest.raises(InputError, match="the force of axis a is 0 N throughout"):
+        first_model(coasts, "m", CATALOGUE)
+    braked = first_model(coasts, "m", CATALOGUE, mass=3.0).axes["a"]
+    assert braked.friction.values["Fc"] == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["-2"], r"axis a: mass = -2 kg: give a number from 1e-15 to 1e\+15, in kg, or 0"),
+        (["b=2"], "a mass of axis b: the logs have a; name one of them"),
+        (["heavy"], "--mass heavy: give a number in kg"),
+        (["a=2", "--mjcf", "arm.xml"], "arm.xml have their mass there; give none beside them"),
+    ],
+)
+def test_a_mass_that_no_axis_can_have_is_one_line(tmp_path, given, said):
+    write_log(slow(), tmp_path / "run.mcap")
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body><joint name="a" type="slide" axis="1 0 0"/>'
+        '<geom size="0.1" mass="2"/></body></worldbody></mujoco>'
+    )
+    told = refusal("new", "run.mcap", "-o", "m.toml", "--mass", *given, folder=tmp_path)
+    assert re.search(said, told), told
+
+
+def test_of_several_axes_a_mass_is_given_by_name():
+    both = {"l": replace(slow(), axes={"a": slow().axes["a"], "b": slow().axes["a"]})}
+    with pytest.raises(InputError, match="a mass of 3: a, b move; give it by axis, as in a=3"):
+        first_model(both, "m", CATALOGUE, mass=3.0)
+    found = first_model(both, "m", CATALOGUE, mass={"a": 3.0, "b": 4.0})
+    assert [axis.mass for axis in found.axes.values()] == [3.0, 4.0]
+
+
+def shifted(by: float = 0.0, times: float = 1.0, force: float = 1.0, units=LINEAR_UNITS) -> Log:
+    own = drive().axes["a"].columns
+    columns = {"position": by + times * own["position"], "force": force * own["force"]}
+    return Log(1000.0, {"a": AxisLog(columns, units)})
+
+
+def stepped() -> Log:
+    """A shaft that takes few values, which lie on steps of nearly 2 rad."""
+    t = np.arange(500) / 50.0
+    angle = 9.55 * np.sin(2.0 * np.pi * 5.0 * t)
+    return Log(50.0, {"a": AxisLog({"position": angle, "force": -angle}, ROTARY_UNITS)})
+
+
+AWKWARD = {
+    "far from zero": shifted(by=5.0, times=0.02),
+    "farther": shifted(by=-731.0, times=1e-3),
+    "over a million turns": shifted(times=3e7, force=3e7, units=ROTARY_UNITS),
+    "by steps of a radian": stepped(),
+    "a tiny machine": shifted(times=1e-6, force=1e-12),
+    "a huge one": shifted(times=1e4, force=1e9),
+}
+
+
+@pytest.mark.parametrize("kind", AWKWARD)
+def test_what_is_written_can_be_read(tmp_path, kind):
+    mass = 1e-6 if kind == "by steps of a radian" else None  # whose force goes with the place
+    model = first_model({"l": AWKWARD[kind]}, "m", CATALOGUE, mass=mass)
+    save_model(model, tmp_path / "m.toml")
+    axis = load_model(tmp_path / "m.toml").axes["a"]
+    assert axis == model.axes["a"]
+    x = AWKWARD[kind].axes["a"].position
+    if axis.hardware.travel is not None:
+        low, high = axis.hardware.travel
+        assert low < x.mean() < high
+        assert 0.9 * np.ptp(x) < high - low < 1.3 * np.ptp(x)
+
+
+def test_logs_that_tell_no_mass_stand_still_or_differ_in_rate_are_refused():
     with pytest.raises(InputError, match=r"axis a: l cannot tell the mass.*faster changes") as why:
-        first_model({"l": slow}, "m", CATALOGUE)
+        first_model({"l": slow()}, "m", CATALOGUE)
     assert "\n" not in str(why.value)
     still = Log(1000.0, {"a": AxisLog({"position": 0.0 * T, "force": 0.0 * T})})
-    with pytest.raises(InputError, match="no axis moves in l"):
+    with pytest.raises(InputError, match="axis a; l: axis a stands still"):
         first_model({"l": still}, "m", CATALOGUE)
     with pytest.raises(InputError, match="sampled at 500, 1000 Hz"):
         first_model({"l": drive(), "m": drive(rate=500.0)}, "m", CATALOGUE)

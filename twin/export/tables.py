@@ -216,10 +216,21 @@ def exported(
     return Exported({file: text for files in made for file, text in files.items()}, found)
 
 
+def _size(force: Array) -> float:
+    """RMS of a force (n,) N; 0 where the axis does not move at all."""
+    return float(np.sqrt(np.mean(force**2))) if len(force) else 0.0
+
+
 def _judged(model: MachineModel, name: str, given: list[SetpointMotion], made: Made) -> HeldAxis:
     axis, others = model.axes[name], [a for a in model.axes if a != name]
     ends = np.concatenate([m.setpoints[name][0] for m in given])
     reach = axis.hardware.travel or (float(ends.min()), float(ends.max()))
+    if not reach[0] < reach[1]:
+        raise InputError(
+            f"axis {name}: stands still in {', '.join(m.name for m in given)}, and the model has "
+            f"no travel, so that no table over its {axis.units.words('position')} can be made; "
+            "give the model its travel, or a log in which the axis moves"
+        )
     speed = max(*(np.abs(m.setpoints[name][1]).max() for m in given), axis.hardware.velocity)
 
     def tabled(of: AxisModel) -> AxisTables:
@@ -245,7 +256,7 @@ def _judged(model: MachineModel, name: str, given: list[SetpointMotion], made: M
         if effect in found.axis.names:
             less = axis.without(effect)
             own, in_tables = total - both(less, tabled(less))
-            loss = Loss(*(float(np.sqrt(np.mean(f**2))) for f in (own, own - in_tables)))
+            loss = Loss(*(_size(force) for force in (own, own - in_tables)))
             if loss.is_negligible and loss.size:
                 kept.append(effect)
                 continue

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tomlkit
+from pydantic import ValidationError
 
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
@@ -265,14 +267,28 @@ def save_model(model: MachineModel, path: str | Path) -> None:
     """Write the model as a TOML file, each value with its unit in a comment.
 
     Its MJCF text is written beside it where there is no such file yet. A file of that path is
-    replaced as a whole or not at all. Raises InputError where it cannot be written.
+    replaced as a whole or not at all. Raises InputError where it cannot be written, and where it
+    could not be read again.
     """
-    path = Path(path)
-    write_atomically(path, format_model(model).encode())
+    path, text = Path(path), format_model(model)
+    _checked(tomllib.loads(text), str(path))
+    write_atomically(path, text.encode())
     if model.mjcf and model.mjcf_name:
         beside = path.parent / model.mjcf_name
         if not beside.exists():
             write_atomically(beside, model.mjcf.encode())
+
+
+def storable(hardware: Hardware) -> Hardware:
+    """The hardware less what no model's file may hold, which has its default."""
+    given = {f.name: getattr(hardware, f.name) for f in fields(Hardware)}
+    try:
+        AxisEntry.model_validate({name: v for name, v in given.items() if v is not None})
+    except ValidationError as errors:
+        wrong = {str(error["loc"][0]) for error in errors.errors()}
+        defaults = Hardware()
+        return replace(hardware, **{name: getattr(defaults, name) for name in wrong})
+    return hardware
 
 
 ENTRY = "intervals"  # of the TOML document

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
@@ -151,6 +152,14 @@ def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> N
         )
 
 
+class Hindrance(Enum):
+    """Why a diagnosis does not offer an effect on an axis that could have it."""
+
+    OTHER_AXIS = "it depends on the other axis, and there are several"
+    IMPOSED = "it acts through the motor or the moved mass, and the motion is imposed"
+    NO_ROTOR = "it is of the drive of a joint, whose rotor's inertia is not in the model"
+
+
 @dataclass(frozen=True)
 class AxisModel:
     """One axis of a machine: what is moved, what surrounds it, and its effects.
@@ -203,18 +212,28 @@ class AxisModel:
         return self.mass == 0.0
 
     def can_have(self, effect: Effect) -> bool:
-        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis.
+        """Whether a diagnosis offers the effect: it acts, and no other has its law on this axis."""
+        return self._suits(effect) and self.hindrance(effect) is None
+
+    def hindrance(self, effect: Effect) -> Hindrance | None:
+        """Why a diagnosis does not offer an effect that an axis like this can have; else None.
 
         What the drive of a joint does to the command, but for its torque constant, is asked beside
         its rotor's inertia, whose torque a lag or a limit would imitate where the bodies are light.
         """
+        if not self._suits(effect):
+            return None
+        if not self._moves_with(effect):
+            return Hindrance.IMPOSED
         drives = effect.kind is Kind.ACTUATION and effect.of_joints is None
-        if drives and self.joint is not None and self.weighed is self:
-            return False
+        bare = drives and self.joint is not None and self.weighed is self
+        return Hindrance.NO_ROTOR if bare else None
+
+    def _suits(self, effect: Effect) -> bool:
+        """Whether an axis of this kind can have the effect, and no other has its law there."""
         present = [f.effect for f in self.effects]
         suits = effect.suits is None or effect.suits(present, self.rotary)
-        here = effect.of_joints in (None, self.joint is not None)
-        return here and suits and self._moves_with(effect)
+        return suits and effect.of_joints in (None, self.joint is not None)
 
     def _moves_with(self, effect: Effect) -> bool:
         """Whether the effect acts on this axis at all: imposed motion has no motor and no mass.
@@ -247,7 +266,7 @@ class AxisModel:
         return next(f for f in self.effects if f.effect.name == effect)
 
     def begun_as(self, other: AxisModel) -> AxisModel:
-        """The same effects, with the mass and the values that another axis has for those of both."""
+        """The same effects, with the mass and the values of another axis, for those of both."""
 
         def begun(law: Fitted) -> Fitted:
             name = law.effect.name
@@ -323,6 +342,10 @@ class MachineModel:
     def can_use(self, effect: Effect) -> bool:
         """Whether "the other axis" that the effect may depend on is one axis of this machine."""
         return len(self.axes) <= MOST_AXES_OF_A_PAIR or not effect.reads_other_axis
+
+    def hindrance(self, effect: Effect, axis: str) -> Hindrance | None:
+        """Why a diagnosis of an axis does not offer an effect that it could have; else None."""
+        return self.axes[axis].hindrance(effect) if self.can_use(effect) else Hindrance.OTHER_AXIS
 
     def require_usable(self, effect: Effect, axis: str) -> None:
         """Raise InputError for an effect that this machine cannot have."""

@@ -483,7 +483,7 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
         steps=[_step(d, i) for i in range(len(d.steps))],
         parameters=estimate_entries(summary.after),
         refit=result.refits.get(axis),
-        not_tried=result.not_tried,
+        not_tried=list(result.not_tried.get(axis, {})),
         notes=said.notes,
         next_experiment=planned and answer_of(planned),
         next_experiment_refused=result.not_planned.get(axis),

@@ -66,8 +66,8 @@ class FitEntry(Entry):
     holdout_force_error: Number
     test_force_error: Number
     unit: str = read("axis.units.force")
-    left_out: list[str] = read("still")
-    """Logs in which the axis stands still."""
+    left_out: list[str]
+    """Logs that say nothing of the axis."""
     force_noise: Number
     """Force that no sensor makes and nothing measured predicts, RMS."""
     force_shift: Number = read("channel_delay")
@@ -84,7 +84,7 @@ class FitAnswer(Answer):
     objective: Literal["force"] = "force"
     axes: dict[str, FitEntry]
     not_fitted: list[str]
-    """Axes that move in no log."""
+    """Axes of which no training log says anything."""
     left_out: list[str] = Field([])
     """Logs that say nothing of an axis, and why."""
 
@@ -99,6 +99,7 @@ def _(result: FitResult, **more: Any) -> FitAnswer:
             converged=fit.ended.name != "NOT_CONVERGED",
             holdout_force_error=result.holdout_error[axis],
             test_force_error=result.test_error[axis],
+            left_out=list(result.left_out[axis]),
             beginnings_left_out=result.datasets[axis].begun,
             parameters=estimate_entries(result.estimates[axis]),
             refit=result.refits[axis],

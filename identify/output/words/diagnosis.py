@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
 from identify.estimation.found_shape import FoundShape, FreeExponent
+from identify.estimation.offered import NotTried, RestsTooOften
 from identify.output.numbers import (
     DisplayUnit,
     capitalised,
@@ -39,7 +40,8 @@ from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Confirmation, Finding, FindingKind
-from twin.model.units import units_of
+from twin.model.machine import Hindrance
+from twin.model.units import AxisUnits, units_of
 
 
 def finding_in_words(finding: Finding) -> tuple[str, ...]:
@@ -452,12 +454,27 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
     ]
     if why := result.not_planned.get(axis):
         every.append(f"no experiment that would tell them apart is proposed: {why}")
-    if result.not_tried:
-        every.append(
-            f"not tried: {', '.join(result.not_tried)}, as each depends on the other axis, and of "
-            "more than two it is not known which; diagnose a model of two axes alone"
-        )
+    every += not_tried_in_words(result.not_tried.get(axis, {}), units)
     return tuple(note for note in every if note)
+
+
+def not_tried_in_words(found: Mapping[str, NotTried], units: AxisUnits) -> list[str]:
+    """Which effects were not tried, a sentence for each reason."""
+    imposed = f"{units.mass_name} = 0 {units.mass} says that the motion is imposed"
+    said = {
+        Hindrance.OTHER_AXIS: "as each depends on the other axis, and of more than two it is not "
+        "known which; diagnose a model of two axes alone",
+        Hindrance.IMPOSED: f"as each acts through the motor or what it moves, and {imposed}; give "
+        f"the {units.mass_name}",
+        Hindrance.NO_ROTOR: "as what the drive of a joint does is asked beside its rotor's "
+        "inertia; add rotor_inertia",
+        RestsTooOften(): "as the axis comes to rest within nearly every test function, and at rest "
+        "such friction is unknown; give a log in which it moves for longer at a time",
+    }
+    names = {why: [name for name, own in found.items() if own == why] for why in said}
+    return [
+        f"not tried: {', '.join(names[why])}, {text}" for why, text in said.items() if names[why]
+    ]
 
 
 def _about_the_fits(found: AxisDiagnosis, summary: AxisSummary) -> list[str]:

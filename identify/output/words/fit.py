@@ -71,7 +71,7 @@ def over_floor(unit: str, floor: float, *errors: float) -> str:
 
 def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     """What is said of the fit of an axis before its parameters."""
-    fit, still = result.fits[axis], result.left_out[axis]
+    fit = result.fits[axis]
     unit, words = fit.axis.units.force, fit.axis.units.words
     others = {Role.SELECTION: result.holdout_error[axis], Role.TEST: result.test_error[axis]}
     known = {role: e for role, e in {Role.TRAINING: fit.error, **others}.items() if e is not None}
@@ -82,8 +82,7 @@ def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     yield words(OUTCOMES[fit.ended])
     yield from (f"at its bound: {label}" for label in fit.at_bound)
     yield from prepared_in_words(result.datasets[axis])
-    if still:
-        yield f"not fitted on {', '.join(still)}, where axis {axis} stands still"
+    yield from (f"{name} is left out: {why}" for name, why in result.left_out[axis].items())
     if changed := refit_in_words(result.refits[axis]):
         yield changed
     if common := common_reason(result.estimates[axis]):

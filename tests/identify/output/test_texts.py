@@ -21,6 +21,7 @@ from identify.estimation.confounded import Refit
 from identify.estimation.fit import Outcome
 from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
 from identify.estimation.intervals import refusal
+from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
@@ -30,6 +31,7 @@ from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, LogFinding, Severity
 from twin.curve import Coordinate
 from twin.laws import verdict
+from twin.model.machine import Hindrance
 
 FILE = Path(__file__).parent / "texts.txt"
 
@@ -94,7 +96,12 @@ def moved():
     result = of(made.diagnosis_of())
     away = (made.MOVED, replace(made.MOVED, label="b", collapsed=True))
     summaries = {**result.summaries, "x": replace(result.summaries["x"], moved=away)}
-    tried = {"not_tried": ("axis_coupling",), "not_planned": {"x": "no travel"}}
+    why = {
+        "axis_coupling": Hindrance.OTHER_AXIS, "load_dependent_friction": Hindrance.IMPOSED,
+        "payload_mass": Hindrance.IMPOSED, "actuator_lag": Hindrance.NO_ROTOR,
+        "stribeck": RestsTooOften(),
+    }  # fmt: skip
+    tried = {"not_tried": {"x": why}, "not_planned": {"x": "no travel"}}
     return replace(result, summaries=summaries, **tried)
 
 

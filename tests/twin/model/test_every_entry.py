@@ -8,7 +8,7 @@ import os
 import runpy
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,8 @@ from twin.errors import InputError
 from twin.experiments.file import load_experiment, parse_experiment
 from twin.experiments.kinds import KINDS
 from twin.importers import load_mapping
-from twin.model.file import load_model, models_folder, parse_model
-from twin.model.machine import Hardware
+from twin.model.file import load_model, models_folder, parse_model, save_model, storable
+from twin.model.machine import AxisModel, Hardware, MachineModel
 from twin.schemas import FOLDER, written
 
 WRONG: tuple[Any, ...] = (
@@ -147,6 +147,32 @@ def test_a_file_that_is_no_toml_is_one_line(tmp_path: Path, text: str) -> None:
         with pytest.raises(InputError, match=r"m\.toml: is not a TOML file") as refused:
             load()
         assert "\n" not in str(refused.value)
+
+
+COARSE = Hardware(travel=(-2e6, 2e6), encoder_resolution=1.83, velocity=3.0)
+
+
+@pytest.mark.parametrize(
+    ("axis", "hardware", "where"),
+    [
+        ("1", Hardware(), "axes.1: give"),
+        ("x", COARSE, "axes.x"),
+        ("x", replace(COARSE, jerk=0.0), ""),
+    ],
+)
+def test_what_could_not_be_read_is_not_written(
+    tmp_path: Path, axis: str, hardware: Hardware, where: str
+) -> None:
+    model = MachineModel("m", {axis: AxisModel(1.0, hardware)})
+    text = answer(lambda: save_model(model, tmp_path / "m.toml"))
+    assert text is not None
+    assert text.startswith(f"{tmp_path / 'm.toml'}: {where}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_hardware_that_a_file_may_not_hold_has_its_default() -> None:
+    assert storable(COARSE) == Hardware(velocity=3.0)
+    assert storable(Hardware(travel=(-1.0, 2.0))) == Hardware(travel=(-1.0, 2.0))
 
 
 @pytest.mark.parametrize("kind", KINDS)
