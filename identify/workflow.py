@@ -275,7 +275,7 @@ def diagnose(
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = result.datasets if body else {axis: d.dataset for axis, d in axes.items()}
-    return Diagnosis(
+    found = Diagnosis(
         fitted=model,
         axes=axes,
         comparison=_compared(model, prepared, {a: t.floor for a, t in summaries.items()}, progress),
@@ -287,6 +287,8 @@ def diagnose(
         left_over={axis: region for axis, region in regions.items() if region},
         body=body,
     )
+    _ = found.model  # it is complete: to tell it computes nothing
+    return found
 
 
 def _diagnosed(
