@@ -21,6 +21,7 @@ from identify.dataset.prepared_log import stands
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.estimation.evidence import rms
+from identify.estimation.least_squares import orthonormal, unabsorbed
 from twin.effect import LEAST, MOST, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -78,6 +79,7 @@ def first_values(motions: Sequence[Motion], mass: float | None = None) -> FirstV
         return _values(motions, place, beside, mass)
     for length in LENGTHS:
         columns, force = _both_ways(*_rows(motions, length, place))
+        columns = _without_image(columns)
         found = _with_friction(columns, force)
         # of the force's RMS; below, friction that is not known hides the inertia
         least_inertial = 0.005
@@ -170,6 +172,21 @@ def _both_ways(columns: Array, force: Array) -> tuple[Array, Array]:
     one_way = 0.8  # mean direction from which nine tenths of the motion go one way
     straight = abs(np.mean(np.sign(columns[1]))) > one_way
     return _without(columns, "constant") if straight else columns, force
+
+
+def _without_image(columns: Array) -> Array:
+    """Less the columns of the place that acceleration makes, as of a position that is a sine.
+
+    Such a motion tells of mass and spring only what they make together, and a first model has no
+    spring.
+    """
+    made = orthonormal(columns[[0, NAMES.index("constant")]].T)
+    # 0.1 of a column, RMS: less of it friction makes, which bends a sine
+    least = 0.1
+    sizes = np.linalg.norm(columns, axis=1)
+    own = np.linalg.norm(unabsorbed(columns.T, made), axis=0) > least * sizes
+    own[: len(NAMES)] = True
+    return columns * own[:, None]
 
 
 def _without(columns: Array, name: str) -> Array:

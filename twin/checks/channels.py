@@ -124,7 +124,7 @@ def check_units(axis: Axis) -> Iterator[LogFinding]:
         return
     yield from _ratios(axis)
     fit, units = axis.dynamics, axis.log.kind
-    if fit.explains and fit.mass_matters and fit.mass < 0.0:
+    if fit.explains and fit.mass_matters and fit.mass is not None and fit.mass < 0.0:
         yield axis.error(
             Fault.SIGN,
             f"the force acts against the acceleration, as if the "

@@ -111,7 +111,7 @@ def check_excitation(axis: Axis) -> Iterator[LogFinding]:
     share = axis.dynamics.inertial_share
     # share of the force, below which friction that the check does not know hides it
     inertial = 0.005
-    if axis.dynamics.explains and share < inertial:
+    if axis.dynamics.explains and axis.dynamics.mass is not None and share < inertial:
         mass = axis.log.kind.mass_name
         yield axis.warning(
             Fault.WEAK_EXCITATION,

@@ -108,11 +108,12 @@ class Smoother:
 class Dynamics:
     """residual: (m,) command less the model, N, its first sample being number ``first``.
 
-    explains: whether the model holds well. mass: kg, negative where the command is reversed.
+    explains: whether the model holds well. mass: kg, negative where the command is reversed; None
+    where acceleration is a sum of the other regressors, as of a sine it is of the position.
     inertial_share: what acceleration makes of the command, RMS about its mean, as a part of it.
     """
 
-    mass: float
+    mass: float | None
     explains: bool
     inertial_share: float
     residual: Array
@@ -155,7 +156,16 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int, rare:
     explains = float(np.std(residual[use])) < 0.3 * spread  # residual as a part of the command
     mass = float(gains[0] / size[0]) if size[0] > 0.0 else 0.0
     share = float(np.std(gains[0] * scaled[use, 0])) / spread if spread > 0.0 else 0.0
-    return Dynamics(mass, explains, share, residual, first)
+    told = _is_told(scaled[use])
+    return Dynamics(mass if told else None, explains, share, residual, first)
+
+
+def _is_told(scaled: Array) -> bool:
+    """Whether the first of some columns (m, k) is none of the sums of the others."""
+    first, others = scaled[:, 0], scaled[:, 1:]
+    left = first - others @ np.linalg.lstsq(others, first, rcond=1e-12)[0]
+    # 0.1 of it, RMS: less is what friction that the check does not know makes as well
+    return bool(np.linalg.norm(left) > 0.1 * np.linalg.norm(first))
 
 
 def _squares(force: Array, columns: Array, use: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -144,7 +144,7 @@ def test_gains_are_those_put_in_whatever_a_few_samples_say():
     assert (fit.mass, fit.first) == (pytest.approx(3.5, rel=1e-9), 11)
     np.testing.assert_allclose(fit.residual[700:720], 500.0, rtol=1e-6)
     assert fit_dynamics(-force, regressors, kept, 0, RARE).mass == pytest.approx(-3.5, rel=1e-9)
-    assert fit_dynamics(force[:90], 0.0 * regressors[:90], kept[:90], 0, RARE).mass == 0.0
+    assert fit_dynamics(force[:90], 0.0 * regressors[:90], kept[:90], 0, RARE).mass is None
 
 
 @pytest.mark.parametrize(
