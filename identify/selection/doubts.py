@@ -134,11 +134,11 @@ def _refused(ended: Conclusion, found: Found) -> Conclusion:
     if not against:
         return ended
     worst = max(against, key=lambda f: f.tested.after / f.tested.before)
-    found, doubted = without_law(worst.effect, found), dict(ended.doubted)
+    found, doubted = _at_its_best(without_law(worst.effect, found)), dict(ended.doubted)
     rest = _explained(found)
     while weakest := _weakest(rest, found):
         doubted[weakest.effect] = _why(weakest)
-        found = without_law(weakest.effect, found)
+        found = _at_its_best(without_law(weakest.effect, found))
         rest = _explained(found)
     told = replace(rest, doubted=doubted, contradicted=(*ended.contradicted, worst))
     return _refused(told, found)
