@@ -12,10 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.dataset.bodies import bodies_along
+from identify.dataset.bodies import Bodies, bodies_along
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import require_samples
-from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, motion_of
+from identify.dataset.motion import (
+    LONGEST_BLOCK,
+    SHORTEST_BLOCK,
+    SHORTEST_LOG,
+    Motion,
+    motion_of,
+)
 from identify.dataset.prepared_log import stands
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
@@ -230,22 +236,37 @@ def first_model(
     for axis in names:
         going = {n: log for n, log in logs.items() if axis in log.axes and moves(log, axis)}
         if going:
-            ripples = ripples_of_widest(going.values(), axis)
-            # Long blocks hide an axis that swings within them, and of short ones noise hides more.
-            for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
-                motions = [
-                    motion_of(log, axis, n, (), longest, ripples, taken[n].get(axis))
-                    for n, log in going.items()
-                ]
-                found = first_values(motions)
-                if found.mass is not None:
-                    break
+            motions, found = _told(axis, going, taken)
             constant = next(iter(going.values())).axes[axis].force_constant
             joint = begun.axes.get(axis)
             axes[axis] = _first_axis(axis, motions, found, constant, catalogue, joint)
     if not axes:
         raise InputError(f"no axis moves in {', '.join(logs)}; give a log in which one does")
     return replace(begun, axes={**begun.axes, **axes})
+
+
+def _told(
+    axis: str, logs: Mapping[str, Log], taken: Mapping[str, Mapping[str, Bodies]]
+) -> tuple[list[Motion], FirstValues]:
+    """The motions of an axis in logs, and the values that they tell; taken: its bodies by log."""
+    ripples = ripples_of_widest(logs.values(), axis)
+    # Long blocks hide an axis that swings within them, and of short ones noise hides more.
+    for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
+        motions = [
+            motion_of(log, axis, n, (), longest, ripples, taken.get(n, {}).get(axis))
+            for n, log in logs.items()
+        ]
+        found = first_values(motions)
+        if found.mass is not None:
+            break
+    return motions, found
+
+
+def values_of(log: Log, axis: str) -> FirstValues | None:
+    """The first values of an axis of a log; None where it does not move or lasts too short."""
+    if not moves(log, axis) or len(log) / log.sample_rate < SHORTEST_LOG:
+        return None
+    return _told(axis, {"the log": log}, {})[1]
 
 
 def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
