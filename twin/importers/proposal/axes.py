@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from twin.importers.proposal.courses import Column
 from twin.importers.proposal.lexicon import Quantity, Role
 from twin.importers.proposal.motion import explained
@@ -35,25 +37,27 @@ def axes_of(names: Mapping[str, Name], columns: Mapping[str, Column]) -> dict[st
         key
         for key in dict.fromkeys(place.values())
         if any(is_position(n) for c, n in names.items() if place[c] == key)
-        and any(is_drive(n) or _drives(n) for c, n in names.items() if place[c] == key)
+        and any(_may_drive(n) for c, n in names.items() if place[c] == key)
     ]
-    if len(whole) > 1 and () in whole and any(len(k) > 0 for k in whole):
+    if len(whole) > 1 and () in whole:
         whole.remove(())  # of no axis by its name
+    if whole == [()] and (told := _by_physics(names, columns)):
+        return told
     if whole:
         of_none = [c for c in names if place[c] == ()] if len(whole) == 1 else []
-        told = _named(whole)
-        return {told[key]: [c for c in names if place[c] == key or c in of_none] for key in whole}
+        called = _named(whole)
+        return {called[key]: [c for c in names if place[c] == key or c in of_none] for key in whole}
     return _by_physics(names, columns) or {PLAIN: list(names)}
 
 
-def _drives(name: Name) -> bool:
-    return name.quantity is Quantity.DRIVE
+def _may_drive(name: Name) -> bool:
+    return is_drive(name) or name.quantity is Quantity.DRIVE
 
 
 def _telling(names: Mapping[str, Name]) -> frozenset[str]:
     """The words that tell axes apart."""
     positions = {w for n in names.values() if n.quantity is Quantity.POSITION for w in n.axis}
-    drives = {w for n in names.values() if is_drive(n) or _drives(n) for w in n.axis}
+    drives = {w for n in names.values() if _may_drive(n) for w in n.axis}
     return frozenset(positions & drives)
 
 
@@ -82,14 +86,18 @@ def _by_physics(names: Mapping[str, Name], columns: Mapping[str, Column]) -> dic
     drives = [c for c, n in names.items() if is_drive(n)]
     if len(positions) < 2 or len(drives) < 2:
         return {}
-    shares = {
-        p: [e.best for e in explained(columns[p].short, [columns[d].short for d in drives])]
+    shares = np.array([
+        [e.best for e in explained(columns[p].short, [columns[d].short for d in drives])]
         for p in positions
-    }
-    best = {p: drives[max(range(len(drives)), key=s.__getitem__)] for p, s in shares.items()}
-    told = 0.5  # of a force, that the motion of its axis makes
-    sure = {p: d for p, d in best.items() if shares[p][drives.index(d)] > told}
-    if len(sure) < 2 or len(set(sure.values())) < len(sure):
+    ])  # fmt: skip
+    told = 0.5  # of a force, that the motion of its axis makes, and more than twice any other's
+    best = shares.argmax(axis=1)
+    sure = {}
+    for row, (position, k) in enumerate(zip(positions, best, strict=True)):
+        most = np.delete(shares[:, k], row).max()
+        if shares[row, k] > max(told, 2.0 * most):
+            sure[position] = drives[k]
+    if len(sure) < 2:
         return {}
     out = {}
     for number, (position, drive) in enumerate(sure.items(), 1):

@@ -38,7 +38,8 @@ def _of_force(motion: Explained) -> Iterator[str]:
     elif motion.pushes:
         yield (
             "the force helps the motion where friction resists it (negative friction); a part of "
-            "the command is missing in this column, such as its feedforward: map the whole force"
+            "the command is missing in this column, such as its feedforward: map the whole force; "
+            "or its sign is reversed"
         )
 
 

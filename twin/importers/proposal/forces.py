@@ -154,7 +154,10 @@ def _with_sign(signal: Signal, motion: Explained) -> Signal:
         )
         return replace(signal, sign=-1).told(why, Certainty.LIKELY)
     if motion.pushes:
-        why = "it helps the motion where friction resists it: a part of the force is missing in it"
+        why = (
+            "it helps the motion where friction resists it: a part of the force is missing in it, "
+            "or its sign is reversed"
+        )
         return signal.told(why, Certainty.UNSURE)
     return signal
 

@@ -173,6 +173,8 @@ CUSTOMARY: Mapping[str, str] = {
     r"(?i)\bDCOM": "%",  # ACS
 }
 
+RAW = frozenset(("counts", "%", "V", "mV", "1"))  # what only a scale turns into a quantity
+
 # Canonical unit (of the import map) -> its other spellings.
 UNITS: Mapping[Quantity, Mapping[str, str]] = {
     Quantity.POSITION: {

@@ -45,10 +45,14 @@ class Explained:
 
     @property
     def is_reversed(self) -> bool:
-        """Whether the force moves the mass with its sign reversed alone."""
+        """Whether the force moves the mass with its sign reversed alone.
+
+        Friction alone does not tell it: that of a part of a command may be below 0.
+        """
         clear = 3.0  # times what that leaves, the sign as it is leaves; in any force a part is left
         left, right = 1.0 - self.forward, max(1.0 - self.backward, 0.02)
-        return self.both_ways and self.explains and left > clear * right
+        accelerates = self.inertia < -0.03  # of the force
+        return self.both_ways and self.explains and accelerates and left > clear * right
 
     @property
     def pushes(self) -> bool:
@@ -118,7 +122,8 @@ class Rows:
             return None
         steps = between(position, 1.0)
         weights = _weights(width)
-        slope = np.gradient(weights)  # of the weight, never of the signal
+        r = _places(width)
+        slope = -4.0 * r * (1.0 - r**2)  # of the weight, never of the signal; of any size
         smooth = max(width // 4, 2)
         slow = np.convolve(steps, np.full(smooth, 1.0 / smooth), "same")
         creep = 0.02  # of the usual highest speed, below which the axis rests
@@ -178,10 +183,14 @@ class Rows:
         return 0.1 < part < 0.9
 
 
+def _places(width: int) -> Array:
+    """Of its samples within a test function, between -1 and 1."""
+    return np.asarray((2.0 * np.arange(width) - (width - 1)) / (width + 1))
+
+
 def _weights(width: int) -> Array:
     """(1 - r^2)^2 over a test function, of unit sum."""
-    r = (2.0 * np.arange(width) - (width - 1)) / (width + 1)
-    weights = (1.0 - r**2) ** 2
+    weights = (1.0 - _places(width) ** 2) ** 2
     return np.asarray(weights / weights.sum())
 
 

@@ -15,6 +15,7 @@ from twin.importers.proposal.lexicon import (
     HINTS,
     QUANTITIES,
     RATES,
+    RAW,
     ROLES,
     SMOOTHED,
     UNITS,
@@ -219,7 +220,7 @@ def _name(column: str, shared: frozenset[str]) -> Name:
         if not kept:
             told = words = last = words_of(column)
             quantity, sure = _quantity(told)
-    role = _role(last, quantity) or _role(told, quantity)
+    role = _role([w for w in last if w in told], quantity) or _role(told, quantity)
     if role is None and (symbol := next((s for w in told if (s := _SYMBOLS.get(w))), None)):
         quantity, role = quantity or symbol[0], symbol[1]
     if quantity is None and [w for w in told if not w.isdigit()] == ["r"]:
@@ -286,8 +287,12 @@ def _with_unit(
     of, unit = may[0]
     if of is Quantity.CURRENT and "d" in words_of(column):
         return Quantity.OTHER, None, True  # of the d axis: that makes no force
-    raw = unit in ("counts", "%", "V", "mV")
-    if raw and quantity in (Quantity.POSITION, Quantity.VELOCITY, Quantity.FORCE, Quantity.CURRENT):
+    if unit in RAW and quantity in (
+        Quantity.POSITION,
+        Quantity.VELOCITY,
+        Quantity.FORCE,
+        Quantity.CURRENT,
+    ):
         return quantity, unit, True
     return of, unit, True
 

@@ -9,12 +9,11 @@ import numpy as np
 
 from twin.importers.mapping import find_unit, is_unit
 from twin.importers.proposal.courses import Column
-from twin.importers.proposal.lexicon import CUSTOMARY, TURNING, Quantity
+from twin.importers.proposal.lexicon import CUSTOMARY, RAW, TURNING, Quantity
 from twin.importers.proposal.names import Name, words_of
 from twin.importers.proposal.signals import Axis, File, Signal
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
-RAW = frozenset(("counts", "%", "V", "mV", "1"))  # what only a scale turns into a quantity
 LENGTHS = ("m", "mm", "um")
 ANGLES = ("rad", "deg", "rev")
 _KINDS = ("m", "rad", "m/s", "rad/s")
