@@ -64,6 +64,26 @@ def write_atomically(path: Path, content: bytes) -> None:
         stream.write(content)
 
 
+def kept_beside(path: Path, content: bytes) -> Path | None:
+    """Keep a file that is about to be written over with other content, under a name with a tilde.
+
+    The name that it has then, which no other content had; None where nothing would be lost. Raises
+    InputError.
+    """
+    with _explained(path):
+        if _is_direct(path) or not path.is_file() or (old := path.read_bytes()) == content:
+            return None
+        number = 1
+        while True:
+            kept = path.with_name(f"{path.name}~{number if number > 1 else ''}")
+            if not kept.exists():
+                write_atomically(kept, old)
+                return kept
+            if kept.is_file() and kept.read_bytes() == old:
+                return kept
+            number += 1
+
+
 def is_same_file(one: Path, other: Path) -> bool:
     """Whether two paths are one file, through links too; never a device, a pipe or a folder."""
     if any(_is_direct(path) or path.is_dir() for path in (one, other)):

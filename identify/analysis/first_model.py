@@ -317,6 +317,31 @@ def _held(
     }
 
 
+def _told(
+    axis: str, logs: Mapping[str, Log], bodies: Mapping[str, Bodies | None], mass: float | None
+) -> tuple[list[Motion], FirstValues]:
+    """The motions of an axis in logs, and the values that they tell.
+
+    bodies: by log, of a joint. mass: kg, where it is known.
+    """
+    ripples = ripples_of_widest(logs.values(), axis)
+    # Long blocks hide an axis that swings within them, and of short ones noise hides more.
+    for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
+        motions = [
+            motion_of(log, axis, n, (), longest, ripples, bodies.get(n)) for n, log in logs.items()
+        ]
+        found = first_values(motions, mass)
+        if found.mass is not None:
+            break
+    return motions, found
+
+
+def values_of(log: Log, axis: str) -> FirstValues | None:
+    """The first values of an axis of a log; None where it says nothing of them."""
+    going, _ = telling_in({"the log": log}, axis)
+    return _told(axis, going, {}, None)[1] if going else None
+
+
 def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
     """The machine whose axes are the joints or tendons of those names, without effects."""
     from twin.mujoco.mechanism import joints_of  # MuJoCo takes long to load
@@ -348,16 +373,8 @@ def _first_axis(
     catalogue: Catalogue,
 ) -> AxisModel:
     """bodies: by log, of a joint. own: with its mass alone where that is known. InputError."""
-    ripples = ripples_of_widest(logs.values(), axis)
     known = None if own is None or own.joint is not None else own.mass
-    # Long blocks hide an axis that swings within them, and of short ones noise hides more.
-    for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
-        motions = [
-            motion_of(log, axis, n, (), longest, ripples, bodies[n]) for n, log in logs.items()
-        ]
-        found = first_values(motions, known)
-        if found.mass is not None:
-            break
+    motions, found = _told(axis, logs, bodies, known)
     covered, units = excitation(motions, None), motions[0].units
     if own is None:
         if found.mass is None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from identify.cli.command import Said
 from identify.cli.shared import app
+from twin.installed import pip_install
 
 NEEDED = (
     "numpy", "pydantic", "pint", "scipy", "numba", "mujoco", "matplotlib", "mcap", "protobuf",
@@ -72,7 +73,7 @@ def _packages() -> Line:
 def _importers() -> Line:
     found, absent = _versions(FOR_IMPORT)
     how = f"lacks {', '.join(absent)} (Parquet, HDF5, TDMS, foreign MCAP): "
-    remedy = how + 'pip install "proton-twin[import]"' if absent else None
+    remedy = how + pip_install("import") if absent else None
     return Line("importers", found or "CSV, MAT and JSON alone", remedy, needed=False)
 
 

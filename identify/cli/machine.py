@@ -1,4 +1,4 @@
-"""Commands about machines and logs: from simulate and import to export, example and view."""
+"""Commands about machines and logs: from simulate and new to export, example and view."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from identify.cli.shared import (
     app,
     left_out,
     loaded,
+    was_kept,
     written,
 )
 from identify.output.machine import briefly
@@ -82,58 +83,6 @@ def simulate(
     return Said("\n".join(lines), answer, warnings)
 
 
-@app.command("import")
-def import_(
-    sources: Annotated[
-        list[Path],
-        Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
-    ],
-    mapping: Annotated[
-        Path | None, Option("--map", help="Columns, units, scale, sign, rate.")
-    ] = None,
-    out: Annotated[Path | None, written("MCAP log to write; or the map.")] = None,
-    guess: Annotated[bool, Option("--guess", help="Propose a map for FILE, with reasons.")] = False,
-) -> Said:
-    """Turn a machine's recording into an MCAP log.
-
-    Example: twin import recording.csv --map map.toml -o run.mcap
-    """
-    from identify.output.answers.machine import LogAnswer
-    from twin.checks import check_assumed
-    from twin.importers import import_log, load_mapping
-    from twin.importers.guess import doubts_of
-    from twin.logs import write_log
-
-    if guess:
-        return _guess(sources, out)
-    if mapping is None or out is None:
-        raise InputError("give --map MAP and -o LOG; --guess proposes a map")
-    known = load_mapping(mapping)
-    log = import_log(sources, known)
-    write_log(log, out)
-    answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
-    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
-    doubts = (f"{mapping}: warning: {doubt}" for doubt in doubts_of(known))
-    warnings = [*resampled, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
-    return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
-
-
-def _guess(sources: list[Path], out: Path | None) -> Said:
-    """A proposed map, printed or written; exit code 1 where something is missing in it."""
-    from identify.output.answers.machine import MapAnswer
-    from twin.files import write_atomically
-    from twin.importers.guess import guess_map
-
-    if len(sources) != 1:
-        raise InputError(f"--guess was given {len(sources)} files; give one at a time")
-    found = guess_map(sources[0])
-    if out is not None:
-        write_atomically(out, found.text.encode())
-    text = found.text if out is None else f"{out}: a map to be read and corrected"
-    return Said(text, MapAnswer.of(found, map=found.text), found.missing, not found.missing)
-
-
 @app.command()
 def new(
     logs: Logs,
@@ -159,12 +108,14 @@ def new(
     from identify.analysis.joint_signs import misassigned
     from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
-    from twin.model.file import read_mjcf, save_model
+    from twin.files import kept_beside
+    from twin.model.file import format_model, read_mjcf, save_model
 
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read = dict(recorded)
     model = first_model(read, out.stem, load_catalogue(), bodies, _masses(mass or ()))
+    kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
@@ -181,6 +132,7 @@ def new(
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
+    doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
     return Said("\n".join([text, *notes]), answer, warnings)
 

@@ -37,6 +37,11 @@ def written(what: str) -> Any:
     return Option("--out", "-o", help=what)
 
 
+def was_kept(path: Path, kept: Path) -> str:
+    """That a file which was written over is kept under another name."""
+    return f"{path}: what was there is kept as {kept}"
+
+
 Logs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs.")]
 FitLogs = Annotated[list[Path], Argument(metavar="LOG...", help="MCAP logs to fit on.")]
 Model = Annotated[str, Argument(metavar="MODEL", help="Machine model (.toml).")]

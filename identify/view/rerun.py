@@ -15,6 +15,7 @@ from identify.view.replay import AxisReplay, Replay
 from identify.view.stage import BALL, BEHIND, GHOST, MARK, Stage, camera, shapes
 from twin.errors import InputError
 from twin.files import write_atomically
+from twin.installed import pip_install
 from twin.signals import Array
 
 try:
@@ -22,8 +23,7 @@ try:
     import rerun.blueprint as rrb
 except ImportError as error:
     raise InputError(
-        "--rerun needs rerun-sdk, which is not here; pip install 'proton-twin[rerun]', or give "
-        "--html"
+        f"--rerun needs rerun-sdk, which is not here; {pip_install('rerun')}, or give --html"
     ) from error
 
 TIME = "time"  # s, of the log

@@ -24,6 +24,7 @@ from identify.output.numbers import DisplayUnit, quantity
 from identify.view.replay import Replay
 from twin.errors import InputError
 from twin.files import write_atomically
+from twin.installed import pip_install
 from twin.parallel import Progress
 
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
@@ -166,6 +167,5 @@ def _encoder() -> str:
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError) as error:
         raise InputError(
-            "--video needs ffmpeg, which is not here; pip install 'proton-twin[view]', or give "
-            "--html"
+            f"--video needs ffmpeg, which is not here; {pip_install('view')}, or give --html"
         ) from error

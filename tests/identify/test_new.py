@@ -275,8 +275,8 @@ def test_the_commands_of_a_new_machine(tmp_path):
     assert "axis x: coulomb_viscous.Fs is not determined, as no break away" in done.stdout
     axis = load_model(str(tmp_path / "model.toml"), CATALOGUE).axes["x"]
     assert axis.mass == pytest.approx(MASS, rel=0.05)
-    for wrong in (("import", "run.csv"), ("import", "--guess", "run.csv", "run.csv")):
-        assert twin(*wrong, folder=tmp_path).returncode == 2
+    wrong = ("import", "--guess", "run.csv", "run.csv")
+    assert twin(*wrong, folder=tmp_path).returncode == 2
 
 
 def test_an_oscillator_that_swings_within_a_block_has_its_mass_and_no_uneven_clock() -> None:

@@ -1,247 +1,47 @@
 """A map proposed from a file alone, each entry with its reason; the user corrects and keeps it.
 
-Which columns are which signals of an axis is told by their names, then by their numbers.
+Which columns are which signals of an axis is told by their names and by the physics
+(``twin.importers.proposal``).
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.course import (
-    RATE,
-    Columns,
-    Leader,
-    Pair,
-    leaders,
-    likeness_to_rate,
-    means,
-    moved_by,
-    rate_of_another,
-    rates,
-)
 from twin.importers.importer import table_of
-from twin.importers.mapping import EVERY_COLUMN, ImportMap, find_unit, is_unit, raw_unit
+from twin.importers.mapping import EVERY_COLUMN, ImportMap, find_unit, is_unit
+from twin.importers.proposal.axes import axes_of
+from twin.importers.proposal.courses import columns_of
+from twin.importers.proposal.forces import exchanged, with_force
+from twin.importers.proposal.names import names_of, unit_of, units_of, words_of
+from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
+from twin.importers.proposal.signals import Axis, File
+from twin.importers.proposal.text import (
+    SCALE,
+    Answers,
+    Entry,
+    Need,
+    entries_of,
+    lines_of,
+    needs_of,
+    why_not,
+)
 from twin.importers.table import SignalTable, numbers
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
-from twin.logs.topics import IDENTIFIER
+
+Columns = Mapping[str, Array]
 
 _TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
 _TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-
-# Words that name a signal, the surest first.
-WORDS: Mapping[str, tuple[str, ...]] = {
-    "position": ("position", "pos", "displacement", "encoder", "enc", "angle", "theta", "qm", "q",
-                 "x", "y"),
-    "velocity": ("velocity", "velo", "vel", "speed", "qd", "dq"),
-    "force": ("force", "torque", "effort", "tau", "moment", "f"),
-    "current": ("current", "iq", "cur", "amps", "i"),
-}  # fmt: skip
-ASKED = ("setpoint", "reference", "target", "desired", "demand", "command", "ref", "set", "cmd",
-          "goal", "qg", "sp", "soll")  # fmt: skip
-OTHER = ("act", "actual", "measured", "main", "axis", "data", "joint", "states", "state",
-         "present")  # fmt: skip
-_TURNING = ("torque", "effort", "tau", "moment", "angle", "theta")
-_UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$"
-                           r"|[_ ]([A-Za-z]+_s2?|[A-Za-z/0-9^]+)$")  # fmt: skip
-_FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken for the other unit
-# SI units a count that are assumed, of the size of an encoder's: 1 um and some thousand a turn
-_COUNT = {"m": 1e-6, "m/s": 1e-6, "rad": 1e-3, "rad/s": 1e-3}
-_COMMON = ("m", "mm", "um", "rad", "deg")  # units in which one column may be, its copy in another
 _KINDS = tuple(dict.fromkeys((*LINEAR_UNITS.values(), *ROTARY_UNITS.values())))
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A column that was taken for a signal, and why; unit: None where its name states none."""
-
-    name: str
-    unit: str | None
-    reason: str
-
-
-def words_of(name: str) -> list[str]:
-    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
-    return re.findall(r"[a-z]+", spaced.lower())
-
-
-def named(names: Sequence[str]) -> dict[str, Signal]:
-    """The signals that names tell, the surest name first."""
-    found: dict[str, Signal] = {}
-    left = {name: words_of(bare(name)) for name in names}
-    for field, words in WORDS.items():
-        for asked in (False, True) if field in ("position", "velocity") else (False,):
-            key = f"setpoint_{field}" if asked else field
-            fitting = []
-            for name, own in left.items():
-                if _is_other(name, key):
-                    continue
-                places = [words.index(w) for w in own if w in words]
-                if asked and field == "position" and set(own) <= set(ASKED):
-                    places.append(0)  # qg, goal: of what, is not said
-                if places and bool(set(own) & set(ASKED)) is asked:
-                    fitting.append((min(places), name))
-            if fitting:
-                name = min(fitting)[1]
-                del left[name]
-                found[key] = Signal(name, unit_in(name), "so called")
-    return found
-
-
-def signals_of(names: Sequence[str], columns: Columns, step: float) -> dict[str, Signal]:
-    """The signals that names tell, and those that the numbers tell."""
-    found = named(names)
-    left = [n for n in names if n not in {signal.name for signal in found.values()}]
-    if "position" not in found and (pair := _moved(columns, left, step)):
-        position, velocity, how = pair
-        why = f"{velocity} is its rate ({how:.2f})"
-        found["position"] = Signal(position, unit_in(position), why)
-        found.setdefault("velocity", Signal(velocity, unit_in(velocity), f"the rate of {position}"))
-        left = [n for n in left if n not in pair]
-    if "position" not in found and (driven := _driven(columns, left, step)):
-        position, why = driven
-        found["position"] = Signal(position, unit_in(position), why)
-        left.remove(position)
-    if "position" not in found:
-        return found
-    measured = columns[found["position"].name]
-    for field in ("velocity", "setpoint_velocity"):
-        called = found.get(field)
-        # least correlation with the rate of a position of what is called one
-        if called and likeness_to_rate(measured, columns[called.name], step) < 0.3:
-            left.append(found.pop(field).name)
-    left = _with_setpoints(found, left, columns, step)
-    forces = [n for n in left if not (_is_other(n, "force") and _is_other(n, "current"))]
-    known = {"force", "current"} & found.keys()
-    if not known and (moved := moved_by(columns, forces, measured, step)):
-        why = f"the motion explains {100.0 * moved[1]:.0f} % of it"
-        unit = unit_in(moved[0])
-        found["current" if is_unit(unit, "A") else "force"] = Signal(moved[0], unit, why)
-    return found
-
-
-def _moved(columns: Columns, names: Sequence[str], step: float) -> Pair | None:
-    """The position and its rate, and their correlation: of two pairs that go alike the later."""
-    pair = rate_of_another(columns, names, step)
-    others = [n for n in names if pair and n not in pair]
-    other = rate_of_another(columns, others, step)
-    if pair is None or other is None:
-        return pair
-    alike = leaders(columns, others, means(columns[pair[0]], step), step)
-    return other if other[0] in {one.name for one in alike if one.ahead < 0.0} else pair
-
-
-def _driven(columns: Columns, names: Sequence[str], step: float) -> tuple[str, str] | None:
-    """The position whose motion explains another column as its force, and why it is taken for it.
-
-    Of columns of one course the roughest is measured, and the others are its setpoints.
-    """
-    best: tuple[float, str, list[str]] = (RATE, "", [])
-    for name in names:
-        course = leaders(columns, [n for n in names if n != name], means(columns[name], step), step)
-        alike = [name, *(leader.name for leader in course)]
-        moved = moved_by(columns, [n for n in names if n not in alike], columns[name], step)
-        if moved and moved[1] > best[0]:
-            as_large = [leader.name for leader in course if _unit_of(leader, "m")]
-            best = moved[1], moved[0], [name, *as_large]
-    share, force, alike = best
-    if not alike:
-        return None
-    position = max(alike, key=lambda n: float(np.std(np.diff(columns[n], 2)) / np.std(columns[n])))
-    return position, f"its motion explains {100.0 * share:.0f} % of {force}"
-
-
-def _with_setpoints(
-    found: dict[str, Signal], names: Sequence[str], columns: Columns, step: float
-) -> list[str]:
-    """The setpoints that the numbers tell are added; the names of what is no kind of motion."""
-    position, left = found["position"], list(names)
-    unit = position.unit or assumed("rad" if turns(found) else "m", columns[position.name])
-    column = columns[position.name]
-    for field, signal, of in (
-        ("position", means(column, step), unit),
-        ("velocity", rates(column, step), f"{unit}/s"),
-    ):
-        alike = [(leader, u) for leader in leaders(columns, left, signal, step)
-                 if (u := _unit_of(leader, of))]  # fmt: skip
-        if alike:
-            leader, own = alike[0]
-            side = "ahead of" if leader.ahead >= 0.0 else "behind"
-            lag = f"{abs(leader.ahead) * 1e3:.3g} ms {side} it"
-            why = f"goes as the {field}, {lag}, as large in {own}"
-            found.setdefault(f"setpoint_{field}", Signal(leader.name, own, why))
-        left = [n for n in left if n not in {leader.name for leader, _ in alike}]
-    return left
-
-
-def _unit_of(leader: Leader, unit: str) -> str | None:
-    """The unit in which a column is as large as the one that it goes with; None where in none."""
-    rate = "".join(unit.partition("/")[1:])
-    kinds = ("m/s", "rad/s") if rate else ("m", "rad")
-    size = find_unit(unit, *kinds).size if is_unit(unit, *kinds) else 1.0
-    stated = unit_in(leader.name)
-    for other in [stated] if stated else [unit, *(u + rate for u in _COMMON)]:
-        # and least correlation then: a force that a spring makes may be as large by chance
-        same = 0.99
-        if other == unit:
-            as_large = 1.25  # times, by which a soft loop may miss the size of its setpoint
-            off, most = leader.slope, as_large
-        elif is_unit(other, *kinds) and (stated or leader.likeness > same):
-            sure = 1.06  # the same, where another unit must be what makes the difference,
-            off, most = leader.slope * find_unit(other, *kinds).size / size, sure
-        else:
-            continue
-        if 1.0 / most < off < most:
-            return other
-    return None
-
-
-def turns(found: Mapping[str, Signal]) -> bool:
-    """Whether the axis is rotary: by a unit, or by words where no unit is stated."""
-    for field, signal in found.items():
-        if LINEAR_UNITS[field] != ROTARY_UNITS[field]:
-            if is_unit(signal.unit, ROTARY_UNITS[field]):
-                return True
-            if is_unit(signal.unit, LINEAR_UNITS[field]):
-                return False
-    return any(set(words_of(signal.name)) & set(_TURNING) for signal in found.values())
-
-
-def unit_in(name: str, *kinds: str) -> str | None:
-    """The unit that a name ends with; a word behind a blank or _ need not be one.
-
-    kinds: SI units of what it may be, those of all signals if none.
-    """
-    found = _UNIT_IN_NAME.search(name)
-    bracketed, word = found.groups() if found else (None, None)
-    word = (word or "").replace("_", "/")  # mm_s
-    counted = len(word) > 1 and raw_unit(word)  # one letter, or the number of an axis, is none
-    return bracketed or (word if counted or is_unit(word, *(kinds or _KINDS)) else None)
-
-
-def _is_other(name: str, field: str) -> bool:
-    """Whether the unit in a name is that of another signal; one letter is sure in brackets only."""
-    unit = unit_in(name) or ""
-    sure = len(unit) > 1 or name.endswith(("]", ")"))
-    own = LINEAR_UNITS[field], ROTARY_UNITS[field]
-    return sure and is_unit(unit, *_KINDS) and not is_unit(unit, *own)
-
-
-def bare(name: str) -> str:
-    """A name less its unit; all of it where that is all."""
-    return (_UNIT_IN_NAME.sub("", name) or name) if unit_in(name) else name
-
-
-def assumed(si: str, column: Array) -> str:
-    far, other = _FAR.get(si, (np.inf, si))
-    return other if np.ptp(column) > far else si
 
 
 @dataclass(frozen=True)
@@ -252,8 +52,94 @@ class Guess:
     missing: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class ColumnRow:
+    """A column, its range and course (n,), and what it is taken for, if anything, and why.
+
+    assumed: whether its unit is.
+    """
+
+    column: str
+    unit: str | None
+    assumed: bool
+    low: float
+    high: float
+    course: Array
+    why: str
+    axis: str | None = None
+    field: str | None = None
+    certainty: str | None = None
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is proposed for a file.
+
+    head: the lines before the axes. tail: those behind them, of columns of no axis. holes: by
+    column, where it has no number.
+    """
+
+    name: str
+    file: File
+    axes: tuple[Axis, ...]
+    head: tuple[str, ...]
+    tail: tuple[str, ...]
+    holes: Mapping[str, str]
+
+    def map_text(self, answers: Answers) -> str:
+        """The map, with what the user knows."""
+        lines = [*self.head]
+        for axis in self.axes:
+            lines += lines_of(self.file, axis, answers)
+        return "\n".join([*lines, *self.tail]) + "\n"
+
+    @cached_property
+    def needs(self) -> list[Need]:
+        """What the file does not tell."""
+        return [need for axis in self.axes for need in needs_of(self.file, axis)]
+
+    def lacks(self, answers: Answers) -> tuple[str, ...]:
+        """What the user must still add for the map to be of use, one sentence each."""
+        asked = [what for axis in self.axes for what in axis.asked.values()]
+        scales = [
+            f"axis {n.axis}: the scale of its {n.field} is not known: {n.what}"
+            for n in self.needs
+            if n.entry == SCALE and n.key not in answers
+        ]
+        return (*self.holes.values(), *asked, *scales)
+
+    @cached_property
+    def rows(self) -> list[ColumnRow]:
+        """Each column that varies, with what it is taken for."""
+        rows = []
+        for axis in self.axes:
+            by_column = {e.signal.column: e for e in entries_of(self.file, axis)}
+            rows += [self._row(axis, c, by_column.get(c)) for c in axis.columns]
+        known = {row.column for row in rows}
+        of_none = [c for c in self.file.columns if c not in known]
+        return [*rows, *(self._row(None, c, None) for c in of_none)]
+
+    def _row(self, axis: Axis | None, column: str, entry: Entry | None) -> ColumnRow:
+        values, unit = self.file.columns[column], self.file.names[column].unit
+        low, high = float(values.values.min()), float(values.values.max())
+        if axis is None or entry is None:
+            why = "of no axis by its name" if axis is None else why_not(self.file, axis, column)
+            return ColumnRow(column, unit, False, low, high, values.short, why)
+        signal, assumed = entry.signal, any(need.assumed for need in entry.needs)
+        return ColumnRow(
+            column, entry.unit, assumed, low, high, values.short, ", ".join(signal.reasons),
+            axis.name, signal.field, signal.certainty.value,
+        )  # fmt: skip
+
+
 def guess_map(path: Path) -> Guess:
     """A map for a file of any of the formats; raises InputError where it has no columns."""
+    found = propose(path)
+    return Guess(found.map_text({}), found.lacks({}))
+
+
+def propose(path: Path) -> Proposal:
+    """What is proposed for a file of any of the formats; raises InputError without a column."""
     with reading(path):
         table = table_of(path, EVERY_COLUMN)
         columns, holes = _distinct(table)
@@ -262,29 +148,38 @@ def guess_map(path: Path) -> Guess:
     counters = [n for n, c in columns.items() if _counts(n, c)]
     time = _time({n: c for n, c in columns.items() if n not in counters})
     time_base, step = _time_base(columns, time, counters, table.sample_rate)
+    known = time is not None or table.sample_rate is not None
     moving = {n: c for n, c in columns.items() if n not in (time, *counters) and np.ptp(c) > 0.0}
-    head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
-    lines, used = [head, *time_base], {time}
-    missing = [holes[time]] if time in holes else []
-    for axis, names in _axes(moving).items():
-        found = signals_of(names, moving, step)
-        lines += ["", f"[axes.{axis}]"]
-        lines += [_entry(field, found, moving, step) for field in found]
-        for field in ("position", "force"):
-            if field not in found and not (field == "force" and "current" in found):
-                missing.append(f"axis {axis}: no column of {', '.join(names)} looks like a {field}")
-                lines.append(f'# {field} = {{column = "?", unit = "?"}} # {missing[-1]}')
-        if "current" in found and "force" not in found:
-            unit = "N m/A" if turns(found) else "N/A"
-            lines.append(f"# force_constant = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet")
-        taken = {signal.name for signal in found.values()}
-        lines += _unused([n for n in names if n not in taken], found, moving, step)
-        missing += [holes[n] for n in columns if n in holes and n in taken]
-        used |= {*names, *taken}
+    file = File(names_of([*moving]), columns_of(moving), step if known else None)
+    axes = tuple(_axis(file, a, names) for a, names in axes_of(file.names, file.columns).items())
+    used = {time, *(c for axis in axes for c in axis.columns)}
+    taken = {time, *(s.column for axis in axes for s in axis.signals.values())}
     left = {n: c for n, c in table.columns.items() if n not in used}
     others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]
-    lines += ["", *(f"# not used: {other}" for other in others)] if others else []
-    return Guess("\n".join(lines) + "\n", tuple(missing))
+    head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
+    tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
+    missing = {n: hole for n, hole in holes.items() if n in taken}
+    return Proposal(path.name, file, axes, (head, *time_base), tail, missing)
+
+
+def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
+    """What is proposed for an axis of these columns."""
+    axis = with_position(file, Axis(name, tuple(columns)))
+    if "position" not in axis.signals:
+        return axis.asking({"force": f"axis {name}: {_NO_MOTION}"})
+    return exchanged(file, with_force(file, with_setpoints(file, with_rates(file, axis))))
+
+
+_NO_MOTION = "without a position no column is known to be the force that moves it"
+
+
+def unit_in(name: str, *kinds: str) -> str | None:
+    """The unit that a name states, of the quantities with these SI units; of all if none."""
+    written = unit_of(name)
+    for _, unit in units_of(written) if written else ():
+        if is_unit(unit, *(kinds or _KINDS)):
+            return unit
+    return None
 
 
 def _about(name: str, raw: np.ndarray) -> str:
@@ -298,27 +193,6 @@ def _about(name: str, raw: np.ndarray) -> str:
     if np.ptp(column) == 0.0:
         return f"{name} = {column[0]:g}" + (" throughout" if len(column) > 1 else "")
     return f"{name} ({len(column)} rows, {column.min():.4g} to {column.max():.4g})"
-
-
-def _unused(
-    names: Sequence[str], found: Mapping[str, Signal], columns: Columns, step: float
-) -> list[str]:
-    """Lines with the columns of an axis that are none of its signals, by what keeps them."""
-    kept: dict[str, list[str]] = {}
-    for name in names:
-        kept.setdefault(_why_not(name, found, columns, step), []).append(name)
-    return [f"# not used: {', '.join(alike)}: {why}" for why, alike in kept.items()]
-
-
-def _why_not(name: str, found: Mapping[str, Signal], columns: Columns, step: float) -> str:
-    field = next(iter(named([name])), "")
-    if field in found:
-        return f"{found[field].name} is taken for the {field}"
-    if field in ("velocity", "setpoint_velocity") and "position" in found:
-        position = found["position"].name
-        like = likeness_to_rate(columns[position], columns[name], step)
-        return f"correlates with the rate of {position} by {like:.2f} only"
-    return "neither name nor course tells a signal"
 
 
 def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
@@ -383,64 +257,16 @@ def _time_base(
     return lines, seconds
 
 
-def _axes(columns: Columns) -> dict[str, list[str]]:
-    """Columns by axis: what a name has beside the words of signals and units tells the axis."""
-    told = (*WORDS.values(), ASKED, OTHER)
-    every = {w for words in told for w in words if len(w) > 1}
-    out: dict[str, list[str]] = {}
-    for name in columns:
-        rest = [w for w in words_of(bare(name)) if w not in every]
-        letters = [w for w in rest if w in ("x", "y", "z")]
-        digits = re.findall(r"\d+", name.rpartition("/")[2])
-        axis = letters[0] if letters else f"axis{digits[-1]}" if digits else (rest or ["x"])[-1]
-        out.setdefault(axis, []).append(name)
-    whole = {}
-    for axis, names in out.items():
-        found = named(names).keys()
-        if IDENTIFIER.fullmatch(axis) and "position" in found and {"force", "current"} & found:
-            whole[axis] = names
-    return whole or {"x": list(columns)}
-
-
-def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: float) -> str:
-    """One line of the map, with the reason behind it."""
-    signal, position = found[field], found.get("position")
-    column = columns[signal.name]
-    span = f"{signal.reason}; {column.min():.4g} to {column.max():.4g}"
-    units = ROTARY_UNITS if turns(found) else LINEAR_UNITS
-    if is_unit(signal.unit, units[field]):
-        return f"{field} = {_table(signal.name, signal.unit)} # {span}"
-    counted = raw_unit(signal.unit)
-    if position and field.endswith("velocity") and signal.unit in (None, f"{position.unit}/s"):
-        counted = raw_unit(position.unit)
-    if counted:
-        scale = _COUNT.get(units[field], 1.0)
-        entry = _table(signal.name, counted, scale)
-        return f"{field} = {entry} # {span}; scale ASSUMED: {units[field]} for one"
-    unit, why = assumed(units[field], column), ""
-    if field.endswith("velocity") and position is not None:
-        base = position.unit or assumed(units["position"], columns[position.name])
-        unit = f"{base}/s"
-        moved, given = rates(columns[position.name], step), means(column, step)
-        ratio = float(moved @ given / (given @ given))
-        alike = 0.1  # how far a velocity may be off the rate of its position to be in the same unit
-        if field == "velocity" and abs(ratio - 1.0) > alike:
-            why = f", but one of it is {ratio:.3g} {unit} by the position: correct one of the units"
-    return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"
-
-
-def _table(name: str, unit: str | None, scale: float | None = None) -> str:
+def _table(name: str, unit: str | None) -> str:
     column, text = (json.dumps(value, ensure_ascii=False) for value in (name, unit))
-    scaled = "" if scale is None else f", scale = {scale:g}"
-    return f"{{column = {column}, unit = {text}{scaled}}}"
+    return f"{{column = {column}, unit = {text}}}"
 
 
 def doubts_of(mapping: ImportMap) -> Iterator[str]:
     """What a map lacks, and units that the names of its columns state otherwise, in brackets."""
     for name, axis in mapping.axes.items():
         for field, column in axis.columns.items():
-            found = _UNIT_IN_NAME.search(column.name)
-            stated = found and found[1]
+            stated = unit_of(column.name, bracketed=True)
             if column.scale != 1.0 or not stated or not is_unit(stated, *_KINDS):
                 continue
             unit = find_unit(stated, *_KINDS)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from twin.entries import near
 from twin.errors import InputError
 from twin.files import atomic_writer
+from twin.installed import pip_install
 from twin.logs import Log
 from twin.logs.container import LARGEST_RATIO
 from twin.logs.log import Array
@@ -108,7 +109,7 @@ def extra(module: str) -> ModuleType:
     except ImportError as error:
         raise InputError(
             f"needs the package {module.partition('.')[0]}; "
-            "install it with: pip install proton-twin[import]"
+            f"install it with: {pip_install('import')}"
         ) from error
 
 

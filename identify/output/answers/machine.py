@@ -207,11 +207,43 @@ class RecoveryAnswer(Answer):
 # --- files -----------------------------------------------------------------------------------
 
 
+class ProposedColumn(Entry):
+    """A column, and the signal of an axis that it is taken for; null where it is none."""
+
+    column: str
+    unit: str | None
+    assumed: bool
+    """Whether the unit is, as nothing tells it."""
+    low: Number
+    high: Number
+    axis: str | None
+    field: str | None
+    certainty: Literal["sure", "likely", "unsure"] | None
+    why: str
+
+
 class MapAnswer(Answer):
-    """What `twin import --guess` prints: a map as TOML, and what is missing in it."""
+    """What `twin import` prints of a map that it proposes: as TOML, and what is missing in it."""
 
     map: str
     missing: list[str]
+    columns: list[ProposedColumn]
+
+
+class MapProofEntry(Entry):
+    """What the motion explains of the force of an axis, as it is and with its sign reversed."""
+
+    explained: Number = read("motion.forward")
+    explained_reversed: Number = read("motion.backward")
+    both_ways: bool = read("motion.both_ways")
+    """Whether the axis moves both ways, without which no sign is told."""
+
+
+class ImportAnswer(LogAnswer):
+    """What `twin import` prints of a log by a map that it proposed and wrote beside it."""
+
+    map: File
+    proofs: dict[str, MapProofEntry]
 
 
 class NewModelAnswer(Answer):

@@ -1,4 +1,4 @@
-"""A sine is an experiment: its position is its acceleration, and tells no spring beside the mass."""
+"""A sine is an experiment: its acceleration is its position, and tells no spring beside a mass."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """A proposed map reads the file that it was proposed for, and says what it assumes."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import cli_runs
@@ -11,6 +12,7 @@ from scipy.io import savemat
 
 from twin.checks import Fault, check_log
 from twin.checks.content import assumptions
+from twin.errors import InputError
 from twin.importers import import_log
 from twin.importers.guess import guess_map
 from twin.logs import read_log, write_log
@@ -20,16 +22,15 @@ from twin.model.machine import AxisModel, MachineModel
 T = np.arange(4000) / 1000.0
 Q = 0.05 * np.sin(5.0 * T) + 0.02 * np.sin(13.0 * T)
 V = 0.25 * np.cos(5.0 * T) + 0.26 * np.cos(13.0 * T)
-F = -3.0 * np.gradient(V, T) + 2.0 * np.sign(V) + 5.0 * V
+F = 3.0 * np.gradient(V, T) + 2.0 * np.sign(V) + 5.0 * V
 NOISE = np.random.default_rng(3).standard_normal(len(T))
 
 
-def columns_of(folder: Path, text: str) -> dict[str, dict[str, str]]:
-    """Axis -> field -> column."""
-    found = mapping(folder, text)
+def columns_of(text: str) -> dict[str, dict[str, str]]:
+    """Axis -> field -> column, also of a map that asks for a scale."""
     return {
-        axis: {field: c.column for field, c in entry.columns.items()}
-        for axis, entry in found.axes.items()
+        axis: {field: table["column"] for field, table in entry.items() if isinstance(table, dict)}
+        for axis, entry in tomllib.loads(text)["axes"].items()
     }
 
 
@@ -40,7 +41,7 @@ def trailing(column, samples=25):
 
 
 GOAL, RATE_OF_GOAL, REACHED, SPEED = Q, V, trailing(Q), trailing(V)
-PUSH = -3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
+PUSH = 3.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED) + 5.0 * SPEED
 MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
 
 
@@ -63,12 +64,12 @@ MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
         # what follows the position is its setpoint and no force
         ({"a": T, "b": REACHED, "c": SPEED, "d": GOAL, "e": PUSH},
          {"x": {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"}},
-         "goes as the position, 30 ms ahead of it"),
+         "goes as the position, 25 ms ahead of it"),
         ({"a": T, "b": GOAL, "c": RATE_OF_GOAL, "d": REACHED, "e": SPEED, "f": PUSH},
          {"x": {"position": "d", "velocity": "e", "setpoint_position": "b",
                 "setpoint_velocity": "c", "force": "f"}}, "setpoint_velocity"),
         ({"a": T, "b": GOAL, "c": REACHED, "d": MOVES_A_MASS},
-         {"x": {"position": "c", "setpoint_position": "b", "force": "d"}}, "explains 97 % of d"),
+         {"x": {"position": "c", "setpoint_position": "b", "force": "d"}}, "explains 100 % of d"),
         ({"t": T, "angle": REACHED, "u": 180.0 / np.pi * GOAL, "w": PUSH},
          {"x": {"position": "angle", "setpoint_position": "u", "force": "w"}}, 'unit = "deg"'),
         ({"t": T, "present_position": REACHED, "goal": GOAL, "load": PUSH},
@@ -80,11 +81,14 @@ MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
 def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, told):
     write_csv(tmp_path / "a.csv", columns)
     found = guess_map(tmp_path / "a.csv")
-    assert not found.missing
-    assert columns_of(tmp_path, found.text) == expected
+    assert columns_of(found.text) == expected
     assert told in found.text
     assert "resample" not in found.text  # the steps are even
-    log = import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
+    # the force of a column that says nothing of one is in a unit that nobody knows
+    asked = [what for what in found.missing if "the scale of its force is not known" in what]
+    assert list(found.missing) == asked
+    text = found.text.replace('unit = "1"', 'unit = "1", scale = 1.0') if asked else found.text
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
     assert log.sample_rate == 1000.0
     moved = log.axes["x"].position
     assert min(np.abs(moved - column).max() for column in (Q, REACHED)) < 1e-9
@@ -93,7 +97,7 @@ def test_names_and_numbers_tell_the_signals(tmp_path, columns, expected, told):
 def test_a_table_may_have_neither_names_nor_a_velocity(tmp_path):
     table = np.column_stack([T, GOAL, REACHED, MOVES_A_MASS])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",")
-    found = columns_of(tmp_path, guess_map(tmp_path / "a.csv").text)
+    found = columns_of(guess_map(tmp_path / "a.csv").text)
     assert found == {"x": {"position": "3", "setpoint_position": "2", "force": "4"}}
 
 
@@ -121,14 +125,14 @@ def test_uneven_times_are_resampled(tmp_path):
 
 
 def test_public_recordings(shared_data, tmp_path):
-    emps = columns_of(tmp_path, guess_map(shared_data / "emps" / "DATA_EMPS.mat").text)
+    emps = columns_of(guess_map(shared_data / "emps" / "DATA_EMPS.mat").text)
     assert emps == {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}
     (arts,) = (shared_data / "arts").glob("1Hz*.json")
-    found = columns_of(tmp_path, guess_map(arts).text)
-    assert found == {"x": {"position": "data[2]", "velocity": "data[4]", "force": "data[3]"}}
-    assert "# not used: data[5], data[6]: neither name nor" in guess_map(arts).text
+    found = guess_map(arts)
+    assert columns_of(found.text) == {"x": {"position": "data[2]", "velocity": "data[4]"}}
+    assert "alike; which of them is the force" in found.missing[0]
     laas = guess_map(shared_data / "laas" / "acc_current.txt").text
-    assert columns_of(tmp_path, laas) == {
+    assert columns_of(laas) == {
         "x": {"position": "Position", "velocity": "Velocity", "current": "Iq"}
     }
     assert "resample = 1000 " in laas
@@ -273,13 +277,13 @@ def turning(column, values):
          {"time": '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the', **PLAIN}),
         # the unit and the data decide against a name
         *((turning(name, GOAL),
-           {"time": "", "setpoint_position": 'unit = "rad"} # goes as the position', **PLAIN})
+           {"time": "", "setpoint_position": 'unit = "rad"} #', **PLAIN})
           for name in ("qd_ref_rad", "qd_ref", "velocity [rad]")),
         (turning("qd_ref", RATE_OF_GOAL),
-         {"time": "", "setpoint_velocity": 'unit = "rad/s"} # so called', **PLAIN}),
+         {"time": "", "setpoint_velocity": 'unit = "rad/s"} # sure: so called', **PLAIN}),
         # a unit a second may be of two words, and a letter behind a name need not be its unit
         ({"time_s": T, **SLIDE, "vel_mm_s": 1e3 * V},
-         {"time": "", "velocity": '"vel_mm_s", unit = "mm/s"} # so called', **PLAIN}),
+         {"time": "", "velocity": '"vel_mm_s", unit = "mm/s"} # sure: so called', **PLAIN}),
         ({"t": T, "theta [rad]": Q, "tau_m": F, "qd_m": V},
          {"time": "", "position": "", "force": '{column = "tau_m"',
           "velocity": '{column = "qd_m"'}),
@@ -303,16 +307,21 @@ def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
     assert "# not used: qd: correlates with the rate of q_rad by 0." in text
 
 
-def test_counts_have_an_assumed_scale_that_is_told(tmp_path):
-    columns = {"t": T, "enc_counts": 1e6 * Q, "speed [counts/s]": 1e6 * V, "u [V]": F}
-    found = lines_of(tmp_path, columns)
-    for field, scale in (("position", "1e-06"), ("velocity", "1e-06"), ("force", "1")):
-        assert f", scale = {scale}}}" in found[field]
-        assert "scale ASSUMED" in found[field]
-    log = import_log(tmp_path / "a.csv", mapping(tmp_path, guess_map(tmp_path / "a.csv").text))
-    np.testing.assert_allclose(log.axes["x"].columns["velocity"], V, atol=1e-9)
-    (what,) = assumed(log)
-    assert "position in counts with scale = 1e-06" in what
+def test_counts_ask_for_their_scale_and_the_map_says_so_until_it_is_given(tmp_path):
+    columns = {"t": T, "enc_counts": np.rint(1e6 * Q), "speed [counts/s]": 1e6 * V, "u [V]": F}
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    assert found.missing == (
+        "axis x: the scale of its position is not known: rad or m for one of enc_counts",
+        "axis x: the scale of its force is not known: N for one of u [V]",
+    )
+    assert "# not used: speed [counts/s]: counted: the position tells it too" in found.text
+    with pytest.raises(InputError, match="unit 'counts' needs a scale"):
+        mapping(tmp_path, found.text)
+    text = found.text.replace('unit = "counts"', 'unit = "counts", scale = 1e-6')
+    text = text.replace('unit = "V"', 'unit = "V", scale = 2.0')
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+    np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-6)
 
 
 def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):
@@ -323,7 +332,7 @@ def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):
     found = guess_map(tmp_path / "a.csv")
     (what,) = found.missing
     assert what.startswith("column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all; ")
-    assert columns_of(tmp_path, found.text) == {"x": {"position": "pos_mm", "force": "force_N"}}
+    assert columns_of(found.text) == {"x": {"position": "pos_mm", "force": "force_N"}}
 
 
 def test_units_below_the_names_are_read(tmp_path):

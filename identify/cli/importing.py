@@ -1,0 +1,188 @@
+"""`twin import`: a recording by a map, or by one that is proposed, shown, asked about and kept."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Option
+
+from identify.cli.command import Said
+from identify.cli.shared import app, was_kept, written
+from twin.errors import InputError
+
+if TYPE_CHECKING:
+    from twin.importers.guess import Proposal
+    from twin.importers.proposal.text import Answers, Need
+
+
+@app.command("import")
+def import_(
+    sources: Annotated[
+        list[Path],
+        Argument(metavar="FILE...", help="CSV, MAT, JSON, Parquet, HDF5, TDMS or MCAP."),
+    ],
+    mapping: Annotated[
+        Path | None,
+        Option("--map", help="Columns, units, scale, sign, rate; proposed if left out."),
+    ] = None,
+    out: Annotated[
+        Path | None, written("MCAP log to write, beside which a proposed map is kept; or the map.")
+    ] = None,
+    guess: Annotated[
+        bool, Option("--guess", help="Propose a map for FILE, with reasons, and import nothing.")
+    ] = False,
+    yes: Annotated[bool, Option("--yes", help="Take the proposed map without a question.")] = False,
+) -> Said:
+    """Turn a machine's recording into an MCAP log, by a map or by one that is proposed.
+
+    Example: twin import recording.csv --map map.toml -o run.mcap
+    """
+    if guess:
+        return _guess(sources, out)
+    if mapping is None:
+        return _by_proposal(sources, out, yes)
+    if out is None:
+        raise InputError(f"--map {mapping}: give -o LOG, the log to write")
+    return _by_map(sources, mapping, out)
+
+
+def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
+    """A log by the map of a user, with what its signals say against it."""
+    from identify.output.answers.machine import LogAnswer
+    from twin.checks import check_assumed
+    from twin.importers import import_log, load_mapping
+    from twin.importers.guess import doubts_of
+    from twin.importers.proposal.doubts import doubts_of_log
+    from twin.logs import write_log
+
+    known = load_mapping(mapping)
+    log = import_log(sources, known)
+    write_log(log, out)
+    answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
+    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
+    unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
+    doubts = [f"{mapping}: warning: {d}" for d in (*doubts_of(known), *doubts_of_log(log))]
+    warnings = [*resampled, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
+    return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
+
+
+def _guess(sources: Sequence[Path], out: Path | None) -> Said:
+    """A proposed map, printed or written; exit code 1 where something is missing in it."""
+    from identify.output.proposal import map_answer
+
+    found = _proposal(sources, "--guess")
+    text = found.map_text({})
+    kept = [] if out is None else _kept(out, text)
+    said = text if out is None else f"{out}: a map to be read and corrected"
+    lacks = found.lacks({})
+    return Said(said, map_answer(found, {}), [*kept, *lacks], not lacks)
+
+
+def _kept(path: Path, text: str) -> list[str]:
+    """Write a map; that another one which was there is kept."""
+    from twin.files import kept_beside, write_atomically
+
+    kept = kept_beside(path, text.encode())
+    write_atomically(path, text.encode())
+    return [] if kept is None else [was_kept(path, kept)]
+
+
+def _proposal(sources: Sequence[Path], option: str) -> Proposal:
+    from twin.importers.guess import propose
+
+    if len(sources) != 1:
+        raise InputError(f"{option} was given {len(sources)} files; give one at a time")
+    return propose(sources[0])
+
+
+# --- the map that is proposed, taken --------------------------------------------------------------
+
+
+def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Said:
+    """Show what is proposed, ask for what is not known, write the map, and import by it."""
+    from identify.output.proposal import map_answer, proposal_text
+
+    found = _proposal(sources, "import without --map")
+    answers: Answers = {}
+    shown = proposal_text(found)
+    asks = sys.stdin.isatty() and sys.stderr.isatty() and "--json" not in sys.argv and not yes
+    if asks:
+        print(f"{shown}\n", file=sys.stderr)
+        answers = _answers(found.needs)
+        yes = _is_yes(input_of("take this map? [Y/n] "))
+        shown = ""
+    if not yes:
+        refused = "" if asks else "; --yes takes this map, --map MAP another"
+        said = "\n\n".join(filter(None, (shown, f"nothing is written{refused}")))
+        return Said(said, map_answer(found, answers), found.lacks(answers), fine=False)
+    log = out or Path(f"{sources[0].stem}.mcap")
+    return _taken(sources[0], found, answers, log, shown)
+
+
+def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: str) -> Said:
+    """Write the map beside the log, and the log where the map is complete."""
+    from identify.analysis.map_proof import proofs_of
+    from identify.output.answers.machine import ImportAnswer
+    from identify.output.proposal import map_answer, proof_text
+    from twin.importers import import_log, load_mapping
+
+    mapping, text = log.with_suffix(".map.toml"), found.map_text(answers)
+    kept = _kept(mapping, text)
+    if lacks := found.lacks(answers):
+        said = f"{mapping}: the map lacks what is marked NOT KNOWN or '?'; complete it, then"
+        said += f"\n  twin import {source} --map {mapping} -o {log}"
+        parts = filter(None, (shown, said))
+        return Said("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)
+    done = _by_map([source], mapping, log)
+    proofs = proofs_of(import_log(source, load_mapping(mapping)))
+    lines = [f"{mapping}: the map, to be used for other recordings of this machine", done.text]
+    lines += [proof_text(axis, proof) for axis, proof in proofs.items()]
+    answer = ImportAnswer.of(done.answer, map=mapping, proofs=proofs)
+    text = "\n\n".join(filter(None, (shown, "\n".join(lines))))
+    return Said(text, answer, [*kept, *done.warnings])
+
+
+def _answers(needs: Sequence[Need]) -> Answers:
+    """What the user says to what is not known; what is left open stays as it is."""
+    out = {}
+    for need in needs:
+        open_ = f"[{need.assumed}]" if need.assumed else "[not known]"
+        while said := input_of(f"{need.axis}: {need.what} {open_} "):
+            if wrong := _refused(need, said):
+                print(wrong, file=sys.stderr)
+                continue
+            out[need.key] = said
+            break
+    return out
+
+
+def _refused(need: Need, said: str) -> str:
+    """Why something is no answer to what was asked; empty where it is one."""
+    from twin.importers.mapping import find_unit
+    from twin.importers.proposal.text import UNIT
+    from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
+
+    try:
+        if need.entry == UNIT:
+            find_unit(said, LINEAR_UNITS[need.field], ROTARY_UNITS[need.field])
+            return ""
+        value = float(said)
+    except InputError as error:
+        return str(error)
+    except ValueError:
+        return f"'{said}' is not a number; give one such as 0.0015, or nothing"
+    return "" if math.isfinite(value) and value != 0.0 else "give a finite number other than 0"
+
+
+def input_of(question: str) -> str:
+    """What is typed behind a question on the terminal; nothing at its end."""
+    print(question, end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip()
+
+
+def _is_yes(said: str) -> bool:
+    return said.lower() in ("", "y", "yes", "j", "ja", "o", "oui")

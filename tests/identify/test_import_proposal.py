@@ -1,0 +1,156 @@
+"""`twin import FILE` without a map: it proposes, shows, asks, writes the map, and proves it."""
+
+import json
+import os
+import re
+import select
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_runs import refusal, twin
+from strict_json import valid
+
+from twin.importers import load_mapping
+from twin.logs import read_log
+
+T = np.arange(6000) / 1000.0
+MASS, COULOMB = 5.0, 2.1  # kg, N
+X = 0.05 * np.sin(5.0 * T) + 0.02 * np.sin(13.0 * T)
+V = 0.25 * np.cos(5.0 * T) + 0.26 * np.cos(13.0 * T)
+F = MASS * (-1.25 * np.sin(5.0 * T) - 3.38 * np.sin(13.0 * T)) + COULOMB * np.sign(V)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    return written(tmp_path, "time_s,pos_mm,force_N", 1e3 * X, F)
+
+
+def written(folder: Path, names: str, *columns: np.ndarray) -> Path:
+    path = folder / "run 1.csv"
+    np.savetxt(path, np.column_stack([T, *columns]), "%.9g", ",", header=names, comments="")
+    return path
+
+
+def test_without_a_terminal_it_shows_what_it_proposes_and_writes_nothing(recording):
+    done = twin("import", recording.name, folder=recording.parent)
+    assert done.returncode == 1
+    position = next(x for x in done.stdout.splitlines() if x.startswith("pos_mm"))
+    for said in (" mm ", "-70 to 70", " x: position ", "sure", "▁", "so called"):
+        assert said in position
+    assert "nothing is written; --yes takes this map, --map MAP another" in done.stdout
+    assert [p.name for p in recording.parent.iterdir()] == [recording.name]
+
+
+def test_yes_writes_log_and_map_and_says_what_they_prove(recording):
+    folder = recording.parent
+    done = twin("import", recording.name, "--yes", "-o", "run.mcap", folder=folder)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert re.search(
+        r"axis x, with this map: moved mass 5.0\d kg, friction 2.1\d N, force explained to 100 %; "
+        r"with the sign reversed it would be \d+ %", done.stdout,
+    )  # fmt: skip
+    log = read_log(folder / "run.mcap")
+    assert log.axes["x"].force == pytest.approx(F, abs=1e-6)
+    assert load_mapping(folder / "run.map.toml").text == log.metadata["import_map"]
+    again = twin("import", recording.name, "--map", "run.map.toml", "-o", "b.mcap", folder=folder)
+    assert again.returncode == 0
+
+
+def test_its_answer_as_json(recording):
+    folder = recording.parent
+    shown = twin("import", recording.name, "--json", folder=folder)
+    answer = valid(json.loads(shown.stdout))
+    assert [c["field"] for c in answer["columns"]] == ["position", "force"]
+    done = twin("import", recording.name, "--yes", "--json", folder=folder)
+    answer = valid(json.loads(done.stdout))
+    assert answer["map"] == "run 1.map.toml"
+    assert answer["proofs"]["x"]["explained"] > 0.99
+
+
+def test_what_is_not_known_is_left_open_and_asked_for(tmp_path):
+    written(tmp_path, "t,pos [mm],torque [%]", 1e3 * X, F)
+    done = twin("import", "run 1.csv", "--yes", folder=tmp_path)
+    assert done.returncode == 1
+    assert "complete it, then" in done.stdout
+    assert "N for one of torque [%]" in done.stderr
+    assert not (tmp_path / "run 1.mcap").exists()
+    assert "scale NOT KNOWN: N for one" in (tmp_path / "run 1.map.toml").read_text()
+
+
+def typed(folder: Path, arguments: list[str], answers: list[str]) -> tuple[str, int]:
+    """What a command writes on a terminal on which these answers are typed, and its exit code."""
+    import pty
+
+    run = "from identify.cli import main; main()"
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.chdir(folder)
+        os.execv(sys.executable, [sys.executable, "-c", run, *arguments])
+    said = b""
+    while select.select([terminal], [], [], 60.0)[0]:
+        try:
+            read = os.read(terminal, 1 << 16)
+        except OSError:
+            break
+        said += read
+        if said.endswith(b"] ") and answers:
+            os.write(terminal, f"{answers.pop(0)}\n".encode())
+    return said.decode().replace("\r", ""), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no terminal to be had there")
+def test_on_a_terminal_it_asks_for_what_is_not_known(tmp_path):
+    written(tmp_path, "t,pos,torque [%]", 1e3 * X, F)
+    answers = ["mm", "much", "0.5", "y"]
+    said, code = typed(tmp_path, ["import", "run 1.csv", "-o", "a.mcap"], answers)
+    assert code == 0, said
+    assert "x: the unit of pos [" in said
+    assert "'much' is not a number" in said
+    assert "moved mass 2.50 kg" in said
+    axis = load_mapping(tmp_path / "a.map.toml").axes["x"]
+    assert axis.position is not None
+    assert axis.force is not None
+    assert (axis.position.unit, axis.force.scale) == ("mm", 0.5)
+
+
+def test_an_edited_map_or_model_is_kept_when_it_is_written_over(recording):
+    folder = recording.parent
+    first = ("import", "--guess", recording.name, "-o", "map.toml")
+    assert twin(*first, folder=folder).returncode == 0
+    assert twin(*first, folder=folder).stderr == ""  # the same again loses nothing
+    for number, kept in enumerate(("map.toml~", "map.toml~2")):
+        (folder / "map.toml").write_text(f"# mine, {number}\n")
+        done = twin(*first, folder=folder)
+        assert f"map.toml: what was there is kept as {kept}" in done.stderr
+        assert (folder / kept).read_text() == f"# mine, {number}\n"
+    assert twin("import", recording.name, "--map", "map.toml", "-o", "a.mcap",
+                folder=folder).returncode == 0  # fmt: skip
+    (folder / "m.toml").write_text("# my model\n")
+    done = twin("new", "a.mcap", "-o", "m.toml", folder=folder)
+    assert "m.toml: what was there is kept as m.toml~" in done.stderr
+    assert (folder / "m.toml~").read_text() == "# my model\n"
+
+
+def test_an_import_says_what_its_signals_contradict(recording):
+    folder = recording.parent
+    text = (
+        'time = {column = "time_s", unit = "s"}\n[axes.x]\n'
+        'position = {column = "pos_mm", unit = "mm"}\n'
+        'force = {column = "force_N", unit = "N", sign = -1}\n'
+    )
+    (folder / "map.toml").write_text(text)
+    done = twin("import", recording.name, "--map", "map.toml", "-o", "a.mcap", folder=folder)
+    assert done.returncode == 0
+    assert "map.toml: warning: axes.x: the motion explains 57 % of the force" in done.stderr
+    assert "give the force or the position sign = -1" in done.stderr
+
+
+def test_what_cannot_be_proposed_is_refused_in_a_line(recording):
+    folder = recording.parent
+    assert "2 files; give one at a time" in refusal(
+        "import", recording.name, recording.name, folder=folder
+    )
+    assert "give -o LOG" in refusal("import", recording.name, "--map", "m.toml", folder=folder)

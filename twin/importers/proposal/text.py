@@ -1,0 +1,270 @@
+"""A proposal as the text of an import map: each entry says why, how sure, and what it lacks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from twin.importers.mapping import is_unit
+from twin.importers.proposal.courses import Column
+from twin.importers.proposal.lexicon import Quantity
+from twin.importers.proposal.signals import Axis, File, Signal
+from twin.importers.proposal.units import (
+    ANGLES,
+    LENGTHS,
+    SURE,
+    customary,
+    drive_unit,
+    is_raw,
+    moves_straight,
+    near,
+    position_unit,
+    rate_ratio,
+    turns,
+    unit_as_large,
+)
+from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
+
+ORDER = ("position", "velocity", "setpoint_position", "setpoint_velocity", "force", "current")
+CONSTANT = "force_constant"
+SCALE, UNIT = "scale", "unit"
+Answers = Mapping[tuple[str, str, str], str]
+"""What the user knows: (axis, field, scale or unit) -> the entry."""
+
+
+@dataclass(frozen=True)
+class Need:
+    """What the file does not tell, of an axis' field. entry: scale, unit or force_constant.
+
+    what: the quantity that is asked for. assumed: what is taken if nobody says otherwise, None
+    where nothing can be.
+    """
+
+    axis: str
+    field: str
+    entry: str
+    what: str
+    assumed: str | None = None
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Under which an answer to it stands."""
+        return self.axis, self.field, self.entry
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the map: a signal in its unit. needs: what is not known of it."""
+
+    signal: Signal
+    unit: str
+    remarks: tuple[str, ...] = ()
+    needs: tuple[Need, ...] = ()
+    scale: str | None = None
+
+    def line(self, column: Column) -> str:
+        """As it stands in the map."""
+        values = {"column": _quoted(self.signal.column), "unit": _quoted(self.unit)}
+        if self.scale is not None:
+            values["scale"] = self.scale
+        if self.signal.sign < 0:
+            values["sign"] = "-1"
+        table = ", ".join(f"{key} = {value}" for key, value in values.items())
+        why = ", ".join(self.signal.reasons)
+        span = f"{column.values.min():.4g} to {column.values.max():.4g}"
+        jumps = () if column.wraps is None else (f"jumps back by {column.wraps:.6g}: it wraps",)
+        told = "; ".join((f"{self.signal.certainty.value}: {why}", span, *jumps, *self.remarks))
+        return f"{self.signal.field} = {{{table}}} # {told}"
+
+    def answered(self, answers: Answers) -> Entry:
+        """The same with what the user knows."""
+        entry = self
+        for need in self.needs:
+            if (given := answers.get(need.key)) is None:
+                continue
+            left = tuple(n for n in entry.needs if n is not need)
+            entry = replace(entry, needs=left, remarks=(f"{need.entry} as given",))
+            unit = need.entry == UNIT
+            entry = replace(entry, unit=given) if unit else replace(entry, scale=given)
+        return entry
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def entries_of(file: File, axis: Axis) -> list[Entry]:
+    """The signals of an axis in their units."""
+    return [_entry(file, axis, axis.signals[f]) for f in ORDER if f in axis.signals]
+
+
+def _entry(file: File, axis: Axis, signal: Signal) -> Entry:
+    if signal.field == "position":
+        return _of_position(file, axis, signal)
+    if signal.field == "setpoint_position":
+        return _of_setpoint(file, axis, signal)
+    if signal.field.endswith("velocity"):
+        return _of_velocity(file, axis, signal)
+    return _of_drive(file, axis, signal)
+
+
+def _of_position(file: File, axis: Axis, signal: Signal) -> Entry:
+    unit, stated = position_unit(file, axis)
+    if is_raw(unit):
+        return _without_scale(axis, signal, unit, _angle_or_length(axis))
+    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
+
+
+def _angle_or_length(axis: Axis) -> str:
+    """The unit of a position that is counted; either where nothing tells whether the axis turns."""
+    return "rad" if turns(axis) else "m" if moves_straight(axis) else "rad or m"
+
+
+def _of_setpoint(file: File, axis: Axis, signal: Signal) -> Entry:
+    unit, stated = position_unit(file, axis)
+    found = file.course(axis.signals["position"].name, signal.name)
+    own = None if found is None else unit_as_large(
+        signal.name, abs(found.slope), found.likeness, unit
+    )  # fmt: skip
+    if found is not None and found.slope < 0.0:
+        signal = replace(signal.told("reversed against the position"), sign=-1)
+    if own is not None and is_raw(own):
+        return _without_scale(axis, signal, own, _angle_or_length(axis))
+    if own is not None:
+        told = f"as large as the position in {own}" if signal.name.unit is None else ""
+        signal = signal.told(told) if told else signal
+        return Entry(signal, own) if stated or signal.name.unit else _assumed(axis, signal, own)
+    said = f"one of it is {1.0 / found.slope:.4g} of the position" if found else "its unit is open"
+    of = signal.name.unit or unit
+    if is_raw(of) or is_raw(unit) or signal.name.unit is None:
+        return _without_scale(axis, signal, "counts" if not is_raw(of) else of,
+                              _angle_or_length(axis), said)  # fmt: skip
+    return Entry(signal, of, (f"but {said}: correct one of the units",))
+
+
+def _of_velocity(file: File, axis: Axis, signal: Signal) -> Entry:
+    position = axis.signals["position"]
+    base, _ = position_unit(file, axis)
+    unit = signal.name.unit
+    if is_raw(base) or is_raw(unit):
+        si = "rad/s" if turns(axis) else "m/s"
+        return _without_scale(axis, signal, unit if unit and is_raw(unit) else "counts", si)
+    if unit is not None:
+        ratio = rate_ratio(file, position, signal, base, unit)
+        return Entry(signal, unit, _off(ratio, unit, signal.field))
+    if (own := customary(signal.name)) is None:
+        own = f"{base}/s"
+    family = ANGLES if base in ANGLES else LENGTHS
+    for other in (own, *(f"{u}/s" for u in family), "rpm"):
+        if near(rate_ratio(file, position, signal, base, other), SURE):
+            told = signal if other == own else signal.told(f"as large as the rate in {other}")
+            return _assumed(axis, told, other)
+    ratio = rate_ratio(file, position, signal, base, own)
+    entry = _assumed(axis, signal, own)
+    return replace(entry, remarks=(*entry.remarks, *_off(ratio, own, signal.field)))
+
+
+def _off(ratio: float, unit: str, field: str) -> tuple[str, ...]:
+    """That a velocity is not as large as the rate of the position, where that is so."""
+    alike = 1.1  # times as large, which a filter's lag may make
+    if field != "velocity" or ratio == 0.0 or near(ratio, alike):
+        return ()
+    return (f"but one of it is {1.0 / ratio:.3g} {unit} by the position: correct one of the units",)
+
+
+def _of_drive(file: File, axis: Axis, signal: Signal) -> Entry:
+    rotary = turns(axis)
+    unit, stated = drive_unit(signal.name, file.column(signal.name), rotary)
+    si = "A" if signal.field == "current" else "N m" if rotary else "N"
+    if unit is None and signal.name.unit is not None:  # a torque beside a length
+        other = ROTARY_UNITS if not rotary else LINEAR_UNITS
+        of = signal.name.unit if is_unit(signal.name.unit, *other.values()) else "one"
+        hint = "2 pi / lead of the screw in m, times the gear ratio" if not rotary else "the radius"
+        return _without_scale(axis, signal, "counts", si, f"for one {of}: {hint}")
+    if unit is None or is_raw(unit):
+        return _without_scale(axis, signal, unit or "1", si)
+    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
+
+
+def _assumed(axis: Axis, signal: Signal, unit: str) -> Entry:
+    need = Need(axis.name, signal.field, UNIT, f"the unit of {signal.column}", unit)
+    return Entry(signal, unit, ("unit ASSUMED",), (need,))
+
+
+def _without_scale(axis: Axis, signal: Signal, unit: str, si: str, how: str = "") -> Entry:
+    """An entry that the map cannot be used with until somebody gives its scale."""
+    what = f"{si} for one of {signal.column}"
+    need = Need(axis.name, signal.field, SCALE, f"{what}{f' ({how})' if how else ''}")
+    remark = f"scale NOT KNOWN: {si} for one{f', {how}' if how else ''}"
+    return Entry(signal, unit, (remark,), (need,))
+
+
+# --- the lines of an axis -------------------------------------------------------------------------
+
+
+def lines_of(file: File, axis: Axis, answers: Answers) -> Iterator[str]:
+    """The table of an axis, with what is asked for and what is not used."""
+    yield ""
+    yield f"[axes.{axis.name}]"
+    for entry in entries_of(file, axis):
+        yield entry.answered(answers).line(file.columns[entry.signal.column])
+    for field, what in axis.asked.items():
+        yield f'# {field} = {{column = "?", unit = "?"}} # {what}'
+    if (need := constant_of(axis)) is not None:
+        given, unit = answers.get(need.key), _constant_unit(axis)
+        if given is not None:
+            yield f"{CONSTANT} = {given} # {unit}, as given"
+        else:
+            yield f"# {CONSTANT} = 1.0 # {unit}: NOT KNOWN, see the motor's data sheet"
+    kept: dict[str, list[str]] = {}
+    for column in axis.columns:
+        if column not in {s.column for s in axis.signals.values()}:
+            kept.setdefault(why_not(file, axis, column), []).append(column)
+    for why, alike in kept.items():
+        yield f"# not used: {', '.join(alike)}: {why}"
+
+
+def _constant_unit(axis: Axis) -> str:
+    return "N m/A" if turns(axis) else "N/A" if moves_straight(axis) else "N/A or N m/A"
+
+
+def constant_of(axis: Axis) -> Need | None:
+    """The force constant, where an axis has a current and no force."""
+    if "current" not in axis.signals or "force" in axis.signals or "force" in axis.asked:
+        return None
+    return Need(axis.name, CONSTANT, CONSTANT, 
+                f"the force constant of axis {axis.name} in {_constant_unit(axis)}")  # fmt: skip
+
+
+def needs_of(file: File, axis: Axis) -> list[Need]:
+    """All that the columns do not tell of an axis."""
+    needs = [need for entry in entries_of(file, axis) for need in entry.needs]
+    constant = constant_of(axis)
+    return needs if constant is None else [*needs, constant]
+
+
+_KINDS: Mapping[Quantity, str] = {
+    Quantity.OTHER: "no signal of an axis by its name",
+    Quantity.ACCELERATION: "an acceleration, which the position tells too",
+    Quantity.DRIVE: "no force by its name",
+}
+
+
+def why_not(file: File, axis: Axis, column: str) -> str:
+    """Why a column of an axis is none of its signals."""
+    if column in axis.not_used:
+        return axis.not_used[column]
+    name, position = file.names[column], axis.signals.get("position")
+    if name.quantity is Quantity.VELOCITY and position is not None:
+        samples = file.samples_of_a_rate
+        how, _ = file.column(position.name).rate(file.columns[column], samples)
+        least = 0.3  # likeness of what is called one
+        if how < least:
+            return f"correlates with the rate of {position.column} by {how:.2f} only"
+    for signal in axis.signals.values():
+        alike = name.quantity is not None and signal.name.quantity is name.quantity
+        if alike and (signal.name.role is name.role or signal.field in ("force", "current")):
+            return f"{signal.column} is taken for the {signal.field}"
+    unlike = "neither name nor course tells a signal"
+    return unlike if name.quantity is None else _KINDS.get(name.quantity, unlike)
