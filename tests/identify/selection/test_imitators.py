@@ -1,0 +1,101 @@
+"""A law whose knee the motion does not pass is not named: it is another law there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from built_fits import CATALOGUE
+from numpy.typing import NDArray
+from planted_logs import FIRST, HARDWARE, RATE, SLIDE, Ride, asked, begun, few, having, logged
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Fit
+from identify.selection.trying import try_effect
+from twin.logs import Log
+from twin.model.machine import AxisModel
+
+Array = NDArray[np.float64]
+
+BARE = AxisModel(5.3, HARDWARE)
+SHORT = replace(FIRST, seconds=4.0)
+
+
+def commanded(axis: AxisModel, ride: Ride, command: Callable[[Array], Array]) -> Log:
+    """A log whose command is that of the force on the axis, (n,) N -> (n,) N."""
+    log = logged(axis, ride)
+    own = log.axes["x"]
+    columns = {**own.columns, "force": command(own.columns["force"])}
+    return replace(log, axes={"x": replace(own, columns=columns)})
+
+
+def fitted(
+    base: AxisModel, true: AxisModel, command: Callable[[Array], Array] = lambda u: u
+) -> tuple[Fit, Dataset]:
+    """A base fitted to two logs of a machine, and one more held out."""
+    one, two, held = (commanded(true, replace(SHORT, seed=i), command) for i in (1, 2, 3))
+    return begun(base, {"one": one, "two": two}, {"held": held})
+
+
+@pytest.mark.parametrize("known", [(), ("spring",)])
+def test_what_does_not_slip_within_the_travel_is_a_spring(known):
+    """Named as friction with 99 %, one without a bound: Fc = 5e14 N."""
+    sticking = ("dahl", "presliding_hysteresis")
+    found = asked(BARE, having(BARE, "spring", k1=6.0), few(*sticking, *known), ride=SHORT)
+    assert found.answers == tuple((name,) for name in known)
+    refused = {c.effect.name: c.refused for c in found.ranking}
+    assert all(refused[name].endswith("so that it is a spring here") for name in sticking)
+
+
+@pytest.mark.parametrize(
+    ("imitator", "mass", "gain", "told"),
+    [
+        ("actuator_saturation", 1.0, 1.25, "a gain of the motor"),
+        ("actuator_saturation", 0.5, 1.0, "a gain of the motor"),
+        ("base_vibration", 2.0, 1.0, "an inertia"),
+    ],
+)
+def test_a_gain_and_an_inertia_are_no_limit_and_no_frame(imitator, mass, gain, told):
+    """Mass held at that part of the true one; gain: command over force.
+
+    A saturation at 0.15 mN of 30 N was named with 99 %.
+    """
+    held = replace(SLIDE, mass=mass * SLIDE.mass, mass_fixed=True)
+    found = try_effect(*fitted(held, SLIDE, lambda u: gain * u), CATALOGUE[imitator])
+    assert found.refused is not None
+    assert found.refused.endswith(f"so that it is {told} here")
+
+
+LIMIT, WIDTH, LAG = 3.0, 2.0, 4e-3  # N: a fifth of the commands are beyond, a tenth of the largest
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "command"),
+    [
+        ("actuator_saturation", LIMIT, lambda u: 2.0 * u - np.clip(u, -LIMIT, LIMIT)),
+        ("actuator_deadband", WIDTH, lambda u: u + WIDTH * np.sign(u)),
+        ("actuator_lag", LAG, lambda u: u + LAG * RATE * np.append(np.diff(u), 0.0)),
+    ],
+)
+def test_a_law_of_the_actuation_is_found_where_the_motion_passes_its_knee(name, value, command):
+    found = try_effect(*fitted(SLIDE, SLIDE, command), CATALOGUE[name])
+    assert found.refused is None
+    assert found.fit.axis[name].vector()[0] == pytest.approx(value, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("law", "values"),
+    [("actuator_saturation", {"limit": 5.0, "loss": 0.5}), ("actuator_deadband", {"width": 0.3}),
+     ("actuator_lag", {"tau": 4e-3}), ("torque_constant", {"error": 0.1})],
+)  # fmt: skip
+def test_no_refit_lets_an_actuation_take_the_command(law, values):
+    """Friction and spring are taken out, the mass is free: 0.2 mN of 1.5 N had been left."""
+    true = having(SLIDE, "spring", k1=60.0)
+    without, dataset = fitted(BARE, true)
+    driven, _ = fitted(having(BARE, law, **values), true)
+    assert driven.gain > 0.5
+    assert driven.error > 0.75 * without.error
+    own = driven.axis[law]
+    assert own.effect.imitation(own.values, dataset.excitation) is None
