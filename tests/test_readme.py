@@ -22,6 +22,7 @@ import pytest
 from cli_runs import in_small, twin
 
 from twin import effects
+from twin.model.file import load_model
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -85,7 +86,7 @@ def require_installed():
 def assert_the_error_falls(answer, folder):
     """Every command ends well, and on the test log the model with the effect errs far less."""
     steps = {command.split()[1] for command in COMMANDS}
-    assert steps == {"simulate", "check", "fit", "compare", "diagnose", "add", "plan"}
+    assert steps == {"simulate", "check", "fit", "compare", "diagnose", "plan"}
     errors = []
     for command in COMMANDS:
         compares = command.startswith("twin compare")
@@ -122,6 +123,7 @@ def test_the_recordings_are_diagnosed_in_small(tmp_path):
             assert result.returncode == 0, f"{command}\n{result.stderr}"
         assert "Missing: cogging." in result.stdout
         assert (tmp_path / "report.html").stat().st_size > 10_000
+        assert "cogging" in load_model(tmp_path / "better.toml").axes["x"].names
         few = patch("identify.workflow.load_catalogue", effects.load_catalogue)
         with few, redirect_stdout(StringIO()) as out:
             exec(compile(blocks("python")[0], "README.md", "exec"), {})
