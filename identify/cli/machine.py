@@ -99,7 +99,7 @@ def import_(
     """
     from identify.output.answers.machine import LogAnswer
     from twin.checks import check_assumed
-    from twin.importers import import_log, load_mapping
+    from twin.importers import import_log, load_mapping, told_of
     from twin.importers.guess import doubts_of
     from twin.logs import write_log
 
@@ -111,10 +111,10 @@ def import_(
     log = import_log(sources, known)
     write_log(log, out)
     answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
-    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
+    done = told_of(log)
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
     doubts = (f"{mapping}: warning: {doubt}" for doubt in doubts_of(known))
-    warnings = [*resampled, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
+    warnings = [*done, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
     return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
+from twin.importers.clock import find_clock
 from twin.importers.course import (
     RATE,
     Columns,
@@ -33,8 +34,6 @@ from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
 
-_TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
-_TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 # Words that name a signal, the surest first.
 WORDS: Mapping[str, tuple[str, ...]] = {
@@ -259,13 +258,12 @@ def guess_map(path: Path) -> Guess:
         columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
-    counters = [n for n, c in columns.items() if _counts(n, c)]
-    time = _time({n: c for n, c in columns.items() if n not in counters})
-    time_base, step = _time_base(columns, time, counters, table.sample_rate)
-    moving = {n: c for n, c in columns.items() if n not in (time, *counters) and np.ptp(c) > 0.0}
+    clock = find_clock(table, columns)
+    step = clock.step
+    moving = {n: c for n, c in columns.items() if n not in clock.used and np.ptp(c) > 0.0}
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
-    lines, used = [head, *time_base], {time}
-    missing = [holes[time]] if time in holes else []
+    lines, used = [head, *clock.lines], set(clock.used)
+    missing = [*clock.missing, *(holes[n] for n in clock.used if n in holes)]
     for axis, names in _axes(moving).items():
         found = signals_of(names, moving, step)
         lines += ["", f"[axes.{axis}]"]
@@ -342,45 +340,6 @@ def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
             out[name] = column
     longest = max((len(c) for c in out.values()), default=0)
     return {name: column for name, column in out.items() if len(column) == longest}, holes
-
-
-def _counts(name: str, column: Array) -> bool:
-    """Whether a column is the number of its row: that tells no time, unless in a unit of it."""
-    return unit_in(name, "s") is None and bool(np.all(np.diff(column) == 1.0))
-
-
-def _time(columns: Columns) -> str | None:
-    """The column of time stamps: it rises, and is called so or rises evenly."""
-    rising = {n: c for n, c in columns.items() if np.mean(np.diff(c) > 0.0) > 0.9}
-    called = [n for n in rising if set(words_of(n)) & set(_TIME_WORDS)]
-    even = [n for n, c in rising.items() if np.ptp(np.diff(c)) < 0.5 * np.median(np.diff(c))]
-    return next(iter([*called, *even]), None)
-
-
-def _time_base(
-    columns: Columns, time: str | None, counters: Sequence[str], stated: float | None
-) -> tuple[list[str], float]:
-    """The lines of the time base, and the step in s."""
-    if stated is not None:
-        return [f"# the file states its sample rate: {stated:g} Hz"], 1.0 / stated
-    if time is None:
-        why = f"{counters[0]} counts the rows" if counters else "no column rises as times do"
-        return [f"sample_rate = 1000.0 # Hz, ASSUMED: {why}"], 1e-3
-    steps = np.diff(columns[time])
-    step = float(np.median(steps[steps > 0.0]))
-    unit, reason = unit_in(time, "s"), "its name states the unit"
-    if unit is None or not is_unit(unit, "s"):
-        slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-        fits = [u for u, size in _TIME_SIZES.items() if slowest <= size / step <= fastest]
-        unit = fits[0] if fits else "s"
-        reason = f"that is {_TIME_SIZES[unit] / step:.6g} Hz"
-    seconds = step * find_unit(unit, "s").size
-    lines = [f"time = {_table(time, unit)} # rises by {step:.6g} {unit}: {reason}"]
-    if np.abs(steps - step).max() > 0.01 * step:  # of a step; what is less even needs resample
-        rate = float(f"{1.0 / seconds:.2g}")
-        spread = f"{steps.min():.4g} to {steps.max():.4g} {unit}"
-        lines.append(f"resample = {rate:g} # Hz, because the steps are uneven: {spread}")
-    return lines, seconds
 
 
 def _axes(columns: Columns) -> dict[str, list[str]]:

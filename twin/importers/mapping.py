@@ -163,14 +163,21 @@ class _Column(Entries):
 
 
 class TimeMap(_Column):
-    """The column of the time stamps."""
+    """The column of the time stamps, or of a counter of the samples."""
 
-    unit: str = Field(description='a unit of time in quotes, such as "s", "ms" or "us"')
+    unit: str | None = Field(
+        None, description='a unit of time in quotes, such as "s", "ms" or "us"; or step'
+    )
+    step: float | None = Field(
+        None, gt=0.0, description="a number above 0: s for one, of a column that counts the samples"
+    )
 
     @property
     def seconds(self) -> float:
         """One of its unit, s; raises InputError for what is no unit of time."""
-        return find_unit(self.unit, "s").size
+        if (self.unit is None) == (self.step is None):
+            raise InputError('give unit, such as "s", or step (s for one, of a counter of samples)')
+        return self.step or find_unit(self.unit or "", "s").size
 
     def to_si(self, raw: Array) -> Array:
         """Times (n,) of the column in s."""

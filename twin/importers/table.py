@@ -32,13 +32,21 @@ SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 class SignalTable:
     """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them.
 
-    first_line: that of the first row, in a file of text.
+    first_line: that of the first row, in a file of text. said: what was left out of it or lost, a
+    sentence each. notes: what its writer says of it as text, such as the lines above the names.
     """
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
     start_ns: int | None = None
     first_line: int | None = None
+    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def clocks(self) -> Mapping[str, NDArray]:
+        """Its columns that are times of a calendar."""
+        return {name: c for name, c in self.columns.items() if np.asarray(c).dtype.kind == "M"}
 
     def hole(self, name: str, values: Array) -> str | None:
         """Where a column (n,) is not a finite number, and the remedy; None where it always is."""
@@ -92,7 +100,7 @@ def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
 def numbers(name: str, raw: NDArray) -> Array:
     """Column as (n,) floats, dates as seconds since the first; raises InputError for text."""
     array = np.asarray(raw)
-    if array.dtype.kind == "M":
+    if array.dtype.kind in "Mm":
         return np.asarray((array - array[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
     if array.ndim != 1 or array.dtype.kind not in "fiub":
         row = next((k for k, v in enumerate(array.flat, 1) if not isinstance(v, _REAL)), None)

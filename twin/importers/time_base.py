@@ -9,10 +9,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.importers.counters import clock_jumps, without_jumps
 from twin.importers.mapping import ImportMap
+from twin.importers.table import numbers
 from twin.logs.log import Array
 from twin.logs.topics import instant
 from twin.numbers import first_not_finite
+
+
+_HOUR, _DAY = 3600.0, 86400.0  # s
+_TIMERS = (2.0**32, 2.0**24, 2.0**16)  # counts of a timer before it begins again
+
+
+def times_of(name: str, raw: NDArray, unit: float) -> tuple[Array, tuple[str, ...]]:
+    """The times (n,) in s of a column as it is in its file, and sentences about what its clock did.
+
+    unit: one of its numbers, s. A clock that begins again, after 2^32 counts or a day, or is put by
+    an hour for summer time, goes on. Raises InputError where the column is not one of numbers.
+    """
+    times = unit * numbers(name, raw)
+    calendar = raw.dtype.kind in "Mm"
+    sizes = (_HOUR, _DAY, 0.5 * _DAY) if calendar else (*(n * unit for n in _TIMERS), _DAY)
+    if not np.isfinite(times).all() or (jumps := clock_jumps(times, sizes)) is None:
+        return times, ()
+    row = int(jumps.rows[0])
+    shown = [_shown(raw[k]) for k in (row - 2, row - 1)]
+    which = f"in row {row} ({shown[0]} is followed by {shown[1]})"
+    if len(jumps.rows) > 1:
+        which += f" and {len(jumps.rows) - 1} more times"
+    if jumps.size == _HOUR:
+        what = f"is put by {_HOUR:g} s {which}: summer time; the hour is taken out"
+    elif calendar or jumps.size == _DAY:
+        what = f"begins again after {jumps.size / 3600.0:g} h {which}: the time goes on"
+    else:
+        bits = round(np.log2(jumps.size / unit))
+        what = f"begins again {which}: the roll-over of a counter of {bits} bits is taken out"
+    return without_jumps(times, jumps), (f"column '{name}': the clock {what}",)
+
+
+def _shown(value: np.generic) -> str:
+    """A time as its file has it, for a sentence."""
+    if value.dtype.kind == "M":
+        return str(value.astype("datetime64[us]").item().time())
+    if value.dtype.kind == "m":
+        return str(value.astype("timedelta64[us]").item())
+    return f"{value:.12g}"
+
+
+def repeated_rows(columns: Mapping[str, Array], time: Array) -> NDArray[np.intp]:
+    """The indices of rows that say once more what the row before them does, the time included."""
+    same = np.append(False, np.diff(time) == 0.0)
+    for column in columns.values():
+        same &= np.append(False, np.diff(column) == 0.0)
+    return np.flatnonzero(same)
+
+
+def rows_a_stamp(time: Array) -> float | None:
+    """How many rows have the same time, where each time is that of as many; None where not.
+
+    Of a recorder whose clock is coarser than its samples.
+    """
+    edges = np.flatnonzero(np.diff(time) != 0.0)
+    lengths = np.diff(edges)
+    few, even = 3, 0.1  # whole stretches; share by which they may differ, and one row
+    if len(lengths) < few or np.median(lengths) < 2.0 or (np.diff(time) < 0.0).any():
+        return None
+    mean = float(np.mean(lengths))
+    off = np.abs(lengths - mean).max() > max(1.0, even * mean)
+    return None if off else len(lengths) * mean / float(time[edges[-1] + 1] - time[edges[0] + 1])
 
 
 def rate_of(time: Array) -> float:
@@ -38,6 +102,11 @@ def rate_of(time: Array) -> float:
         if wrong.any():
             _require_no_hole(time)  # which a clock would not mend
             row = int(np.argmax(wrong))
+            if (coarse := rows_a_stamp(time)) is not None:
+                raise InputError(
+                    f"the time is the same in several rows each, {instant(time[row])} in row "
+                    f"{row + 1} and before; give sample_rate = {coarse:.6g} (Hz) in place of time"
+                )
             raise InputError(
                 f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
                 f"in row {row + 1}, usual are {period:.6g} s a sample; give resample = "

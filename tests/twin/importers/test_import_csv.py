@@ -123,9 +123,8 @@ def test_stamps_with_a_date_are_times(tmp_path: Path, day: str) -> None:
     assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "log.csv").text
 
 
-def test_other_stamps_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 2, column 't': .* nor a time such as .*rate"):
-        imported(tmp_path, stamped("01.05.2024"), CLOCKED)
-    text = guess_map(tmp_path / "log.csv").text
-    assert "sample_rate = 1000.0 # Hz, ASSUMED" in text
-    assert "# not used: t (no numbers)" in text
+def test_stamps_of_no_kind_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
+    text = stamped("2024-05-01").replace("2024-05-01 12", "noon, or 12")
+    with pytest.raises(InputError, match=r"give sample_rate \(Hz\) in place of time|no column 't'"):
+        imported(tmp_path, text, CLOCKED)
+    assert "# sample_rate = ? # Hz: NOT KNOWN" in guess_map(tmp_path / "log.csv").text

@@ -11,6 +11,7 @@ from scipy.io import savemat
 
 from twin.checks import Fault, check_log
 from twin.checks.content import assumptions
+from twin.errors import InputError
 from twin.importers import import_log
 from twin.importers.guess import guess_map
 from twin.logs import read_log, write_log
@@ -264,11 +265,6 @@ def turning(column, values):
 @pytest.mark.parametrize(
     ("columns", "entries"),
     [
-        # the number of a row is no time
-        ({"Sample": INDEX, **SLIDE},
-         {"sample_rate": "1000.0 # Hz, ASSUMED: Sample counts the rows", **PLAIN}),
-        ({"t": INDEX, **SLIDE},
-         {"sample_rate": "1000.0 # Hz, ASSUMED: t counts the rows", **PLAIN}),
         ({"t_ms": INDEX, **SLIDE},
          {"time": '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the', **PLAIN}),
         # the unit and the data decide against a name
@@ -294,6 +290,17 @@ def test_an_entry_has_its_column_and_unit_with_the_reason(tmp_path, columns, ent
     assert found.keys() == entries.keys()
     for entry, line in entries.items():
         assert line in found[entry]
+
+
+@pytest.mark.parametrize("name", ["Sample", "t"])
+def test_the_number_of_a_row_is_no_time_and_no_rate_is_made_up(tmp_path, name):
+    write_csv(tmp_path / "a.csv", {name: INDEX, **SLIDE})
+    found = guess_map(tmp_path / "a.csv")
+    (what,) = found.missing
+    assert what == f"'{name}' counts the rows; give sample_rate (Hz)"
+    assert f"# sample_rate = ? # Hz: NOT KNOWN, '{name}' counts the rows" in found.text
+    with pytest.raises(InputError, match="does not state its sample rate"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
 
 
 def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
