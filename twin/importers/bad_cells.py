@@ -19,6 +19,10 @@ class Row:
     text: str
     cells: Sequence[str]
 
+    def cell(self, column: int) -> str:
+        """One of its cells, "" where it is too short."""
+        return self.cells[column] if column < len(self.cells) else ""
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -97,20 +101,17 @@ class BadCells:
             return
         told = [self._told(row, k) for row, k in cells[:MOST_NAMED]]
         if len(told) == 1:
-            raise InputError(f"{told[0]}{_remedy(*self._cell(*cells[0]))}")
+            raise InputError(f"{told[0]}{_remedy(cells[0][0].cell(cells[0][1]))}")
         more = f"; and {len(cells) - MOST_NAMED} more" if len(cells) > MOST_NAMED else ""
-        empty = all(not self._cell(row, k)[0] for row, k in cells)
+        empty = all(not row.cell(k) for row, k in cells)
         what = "empty" if empty else "no numbers"
         raise InputError(
             f"{len(cells)} cells are {what}: {'; '.join(told)}{more}; correct them or cut out "
             "their rows, or state header_line, delimiter or decimal in the map"
         )
 
-    def _cell(self, row: Row, column: int) -> tuple[str]:
-        return (row.cells[column] if column < len(row.cells) else "",)
-
     def _told(self, row: Row, column: int) -> str:
-        (cell,) = self._cell(row, column)
+        cell = row.cell(column)
         what = f"{cell!r} is not" if cell else "is empty"
         return f"line {row.line}, column '{self._names[column]}': {what}"
 

@@ -22,9 +22,9 @@ from twin.importers.time_base import rows_a_stamp, times_of
 from twin.logs.log import Array
 
 _WORDS = {
-    "time", "timestamp", "timestamps", "stamp", "t", "ts", "zeit", "zeitstempel", "uhrzeit", "clock",
-    "temps", "heure", "tiempo", "elapsed", "epoch", "uptime", "millis", "micros", "nanos", "ms", "us",
-    "ns", "sec", "secs", "seconds", "datetime", "时间", "时间戳", "時間", "時刻", "タイムスタンプ",
+    "time", "timestamp", "timestamps", "stamp", "t", "ts", "zeit", "zeitstempel", "uhrzeit",
+    "clock", "temps", "heure", "tiempo", "elapsed", "epoch", "uptime", "millis", "micros", "nanos",
+    "ms", "us", "ns", "sec", "secs", "seconds", "datetime", "时间", "时间戳", "時間", "時刻",
 }  # fmt: skip
 _COUNTING = {
     "n", "k", "sample", "samples", "index", "idx", "row", "count", "cnt", "counter", "cycle",
@@ -32,7 +32,8 @@ _COUNTING = {
 }  # fmt: skip
 _UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": "us", "ns": "ns",
                "usec": "us", "msec": "ms", "nsec": "ns", "sec": "s", "secs": "s", "seconds": "s",
-               "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns", "s": "s"}  # fmt: skip
+               "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
+               "s": "s"}  # fmt: skip
 _SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
 
@@ -121,7 +122,7 @@ def _unit_of(name: str) -> str | None:
 
 
 def counts(name: str, column: Array) -> bool:
-    """Whether a column (n,) counts the samples, with gaps or begun again; a unit of time is none."""
+    """Whether a column (n,) counts the samples, with gaps or begun again, and tells no time."""
     if _unit_of(name) is not None or (column != np.rint(column)).any() or len(column) < 3:
         return False
     steps = np.diff(_continued(column))
@@ -153,7 +154,7 @@ def _candidates(
         except InputError:
             continue
         steps = np.diff(times)
-        if not (steps > 0.0).any() or (steps < 0.0).mean() > 0.01 and not calendar:
+        if not (steps > 0.0).any() or ((steps < 0.0).mean() > 0.01 and not calendar):
             continue
         one = _Times(name, times, unit, reason, said)
         rising, level = float((steps > 0.0).mean()), float((steps == 0.0).mean())
@@ -176,11 +177,15 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
     slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
     fits = [u for u, size in _SIZES.items() if slowest <= size / step <= fastest]
     unit = fits[0] if fits else "s"
-    return unit, f"{'' if unit == 's' else 'unit ASSUMED: '}that is {_SIZES[unit] / step:.6g} Hz"
+    told = f"that is {_SIZES[unit] / step:.6g} Hz"
+    return unit, told if _SIZES[unit] == 1.0 else f"unit ASSUMED: {told}"
 
 
 def _of_times(
-    found: Sequence[_Times], counters: Sequence[str], stated: StatedRate | None, used: tuple[str, ...]
+    found: Sequence[_Times],
+    counters: Sequence[str],
+    stated: StatedRate | None,
+    used: tuple[str, ...],
 ) -> Clock:
     """The time base by the best of several columns of times."""
     time, why = _best(found)
@@ -199,7 +204,9 @@ def _of_times(
     if np.abs(steps - time.step).max() > 0.01 * time.step:  # what is less even needs resample
         rate = float(f"{1.0 / time.step:.2g}")
         spread = f"{steps.min() / time.step * step:.4g} to {steps.max() / time.step * step:.4g}"
-        lines.append(f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}")
+        lines.append(
+            f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}"
+        )
     if stated and stated.rate and abs(stated.rate * time.step - 1.0) > 0.02:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
     return Clock(tuple(lines), time.step, used)
@@ -247,7 +254,9 @@ def _asked(
         why = f"'{name}' counts the {'samples' if lost else 'rows'}{many}{gap}"
         if lost or many:
             column = json.dumps(name, ensure_ascii=False)
-            lines = [f"# time = {{column = {column}, step = ?}} # s a count: NOT KNOWN, {why}{unit}"]
+            lines = [
+                f"# time = {{column = {column}, step = ?}} # s a count: NOT KNOWN, {why}{unit}"
+            ]
             if lost:
                 lines.append("# resample = ? # Hz: what is lost is bridged by straight lines")
             said = f"{why}{unit}; give step (s a count): time = {{column = {column}, step = ...}}"

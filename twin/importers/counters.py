@@ -1,4 +1,4 @@
-"""Counters that begin again: 2^16 counts of an encoder, 2^32 us of a clock, a day, a summer hour."""
+"""Counters that begin again: 2^16 counts of an encoder, 2^32 us of a clock, a day, an hour."""
 
 from __future__ import annotations
 
@@ -20,6 +20,15 @@ class Wraps:
     size: float
     rows: NDArray[np.intp]
 
+    def told(self, column: str) -> str:
+        """What is wrong with a column of that name."""
+        row = int(self.rows[0])
+        more = f", and {len(self.rows) - 1} more times" * (len(self.rows) > 1)
+        return (
+            f"column '{column}' jumps by {self.size:g} between rows {row - 1} and {row}{more}: its "
+            f"counter begins again after {self.size:g}"
+        )
+
 
 def find_wraps(column: Array) -> Wraps | None:
     """Where a column (n,) jumps by the size of a counter; None where it does not.
@@ -33,19 +42,22 @@ def find_wraps(column: Array) -> Wraps | None:
         if not 0.5 * size < reach < size:
             continue
         jumps = np.abs(steps) > 0.5 * size
-        rest = np.abs(np.where(jumps, steps - np.sign(steps) * size, steps))
-        if jumps.any() and rest.max() < 0.25 * size and size - reach <= 2.0 * rest.max() + 1.0:
+        if not jumps.any() or jumps.all():
+            continue
+        usual = 2.0 * np.abs(steps[~jumps]).max() + 1.0  # what the counter may do in a step
+        rest = np.abs(np.abs(steps[jumps]) - size).max()
+        if max(rest, size - reach) <= usual < 0.5 * size:
             return Wraps(size, np.flatnonzero(jumps) + 2)
     return None
 
 
 def unwrapped(column: Array, size: float) -> Array:
-    """A column (n,) without the jumps of a counter of that size, about where it is least.
+    """A column (n,) without the jumps of a counter of that size, the first row near 0.
 
     So a small negative number that was read without its sign is a small negative number again.
     """
     plain = np.unwrap(column, period=size)
-    return np.asarray(plain - size * np.rint(np.median(plain) / size))
+    return np.asarray(plain - size * np.rint(plain[:1] / size))
 
 
 def clock_jumps(times: Array, sizes: tuple[float, ...]) -> Wraps | None:

@@ -34,7 +34,6 @@ from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
 
-
 # Words that name a signal, the surest first.
 WORDS: Mapping[str, tuple[str, ...]] = {
     "position": ("position", "pos", "displacement", "encoder", "enc", "angle", "theta", "qm", "q",
@@ -51,8 +50,9 @@ _TURNING = ("torque", "effort", "tau", "moment", "angle", "theta")
 _UNIT_IN_NAME = re.compile(r"[\[(]\s*([^\])]*[^\])\s\d][^\])]*?)\s*[\])]\s*$"
                            r"|[_ ]([A-Za-z]+_s2?|[A-Za-z/0-9^]+)$")  # fmt: skip
 _FAR = {"m": (5.0, "mm"), "rad": (40.0, "deg")}  # what goes farther is taken for the other unit
-# SI units a count that are assumed, of the size of an encoder's: 1 um and some thousand a turn
-_COUNT = {"m": 1e-6, "m/s": 1e-6, "rad": 1e-3, "rad/s": 1e-3}
+# What is assumed of an encoder: counts of 1 um, and some thousand a turn
+_COUNT = {"m": "counts_per_metre = 1000000", "rad": "counts_per_turn = 4096"}
+_COUNT |= {"m/s": _COUNT["m"], "rad/s": _COUNT["rad"]}
 _COMMON = ("m", "mm", "um", "rad", "deg")  # units in which one column may be, its copy in another
 _KINDS = tuple(dict.fromkeys((*LINEAR_UNITS.values(), *ROTARY_UNITS.values())))
 
@@ -369,13 +369,13 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
     units = ROTARY_UNITS if turns(found) else LINEAR_UNITS
     if is_unit(signal.unit, units[field]):
         return f"{field} = {_table(signal.name, signal.unit)} # {span}"
-    counted = raw_unit(signal.unit)
+    counted = signal.unit if raw_unit(signal.unit) else None
     if position and field.endswith("velocity") and signal.unit in (None, f"{position.unit}/s"):
-        counted = raw_unit(position.unit)
+        counted = signal.unit or (raw_unit(position.unit) and f"{position.unit}/s")
     if counted:
-        scale = _COUNT.get(units[field], 1.0)
-        entry = _table(signal.name, counted, scale)
-        return f"{field} = {entry} # {span}; scale ASSUMED: {units[field]} for one"
+        per = _COUNT.get(units[field], "scale = 1")
+        entry = _table(signal.name, counted).replace("}", f", {per}}}")
+        return f"{field} = {entry} # {span}; {per.partition(' ')[0]} ASSUMED"
     unit, why = assumed(units[field], column), ""
     if field.endswith("velocity") and position is not None:
         base = position.unit or assumed(units["position"], columns[position.name])
@@ -388,10 +388,9 @@ def _entry(field: str, found: Mapping[str, Signal], columns: Columns, step: floa
     return f"{field} = {_table(signal.name, unit)} # {span}; unit ASSUMED{why}"
 
 
-def _table(name: str, unit: str | None, scale: float | None = None) -> str:
+def _table(name: str, unit: str | None) -> str:
     column, text = (json.dumps(value, ensure_ascii=False) for value in (name, unit))
-    scaled = "" if scale is None else f", scale = {scale:g}"
-    return f"{{column = {column}, unit = {text}{scaled}}}"
+    return f"{{column = {column}, unit = {text}}}"
 
 
 def doubts_of(mapping: ImportMap) -> Iterator[str]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError, at
+from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.stated_rate import StatedRate, stated_rate
@@ -137,7 +138,9 @@ class _Recording:
             with at(f"column '{mapping.time.name}'"):
                 yield
         except InputError as error:
-            others = [n for n, c in self.table.clocks.items() if n != mapping.time.name and _rises(c)]
+            others = [
+                n for n, c in self.table.clocks.items() if n != mapping.time.name and _rises(c)
+            ]
             hint = f"; the times of '{others[0]}' rise: take these" if others else ""
             raise InputError(f"{error}{hint}") from error
 
@@ -150,7 +153,8 @@ class _Recording:
             self._compare(stated, rate, "its times give")
             return rate
         given, own = mapping.sample_rate, self.table.sample_rate
-        if (rate := given or own or (stated and stated.rate)) is None:
+        rate = given or own or (stated.rate if stated else None) or 0.0
+        if not rate:
             raise InputError(
                 "does not state its sample rate; give sample_rate (Hz) or time "
                 '({column = "t", unit = "s"}) in the map'
@@ -200,12 +204,18 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     table = all_dialects()[name].read(path, mapping)
     facts = {"original_format": name, "original_sha256": digest}
     scalars = {n: _scalar(n, numbers(n, table.columns[n])) for n in mapping.scalars()}
-    signals = dict.fromkeys(c.name for c in mapping.columns())
-    columns = {n: numbers(n, table.columns[n]) for n in signals}
+    columns = {c.name: numbers(c.name, table.columns[c.name]) for c in mapping.columns()}
     for n, column in columns.items():
         if hole := table.hole(n, column):
             raise InputError(hole)
     said, times = list(table.said), None
+    for axis, field, c in mapping.signals():
+        found = find_wraps(columns[c.name])
+        if c.wraps is None and found is not None:
+            facts[f"counter.{axis}.{field}"] = found.told(c.name)
+        elif c.wraps is not None:
+            said.append(f"column '{c.name}': a counter that begins again after {c.wraps:g} goes on")
+            columns[c.name] = unwrapped(columns[c.name], c.wraps)
     _common_length(columns)
     if mapping.time is not None:
         raw = np.asarray(table.columns[mapping.time.name])
@@ -255,6 +265,9 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
         for field, c in axis.columns.items():
             rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
             signals[field] = c.to_si(columns[c.key][rows])
+            if axis.side_of(field) == "load":  # what at_joints brings to the load is the motor's
+                (ratio,) = axis.ratios(name).values()
+                signals[field] = signals[field] * (1.0 / ratio if field in HELD else ratio)
             if not np.isfinite(signals[field]).all():
                 raise InputError(
                     f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
@@ -262,7 +275,7 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
                 )
         axes[name] = AxisLog(signals, axis.units, axis.force_constant)
     metadata = {"source": "import", "import_map": mapping.text, **facts}
-    gears = {name: axis.gear for name, axis in mapping.axes.items() if axis.gear}
+    gears = {name: gear for name, axis in mapping.axes.items() if (gear := axis.ratios(name))}
     return Log(rate, at_joints(axes, gears), metadata)
 
 

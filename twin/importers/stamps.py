@@ -161,8 +161,10 @@ class Stamps:
         days, known = self._days()
         if self._is_date:
             return np.array(days, "datetime64[D]")[numbers >> _BITS]
-        starts = [day.astype(np.int64) * 86400 + m.seconds
-                  for day, m in zip(np.array(days, "datetime64[D]"), self._minutes, strict=True)]
+        starts = [
+            day.astype(np.int64) * 86400 + m.seconds
+            for day, m in zip(np.array(days, "datetime64[D]"), self._minutes, strict=True)
+        ]
         ns = np.array(starts, np.int64)[numbers >> _BITS] * _NS + (numbers & ((1 << _BITS) - 1))
         if known:
             return ns.astype("datetime64[ns]")

@@ -1,4 +1,4 @@
-"""A sample rate that a file states in words: "Sample Period: 5 ms", "Abtastrate;1 kHz", fps = 30."""
+"""A sample rate that a file states in words: "Sample Period: 5 ms", "Abtastrate;1 kHz"."""
 
 from __future__ import annotations
 

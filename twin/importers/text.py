@@ -139,7 +139,8 @@ class Layout:
     names: of the columns, each with its unit in ``units`` ("" or nothing: none). skip: lines before
     the first row of numbers. header: the index of the line with the names, None without one. rows:
     some rows of the beginning, as cells. sample_rate (Hz), start_ns: if stated. is_row: whether a
-    line is a row at all, None where each is. end: the beginning of the line behind the last row. said: what is told.
+    line is a row at all, None where each is. end: how the line behind the last row begins. said:
+    what is told.
     """
 
     encoding: str
@@ -202,7 +203,9 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
     names = layout.called(asked)
     wanted = {name: names.index(name) for name in chosen(asked, names)}
     places = {**wanted, **_dates_of(wanted, layout, names)}
-    text = {n: k for n, k in places.items() if not asked and layout.kinds[k] == "text"}
+    text = {n: k for n, k in places.items() if layout.kinds[k] == "text"}
+    if asked and text:
+        raise InputError(_of_text(layout, *next(iter(text.items()))))
     where = [k for name, k in places.items() if name not in text]
     said = layout.said
     try:
@@ -210,7 +213,7 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
     except ValueError:
         read, more = _row_by_row(path, layout, where, every=not asked)
         said = (*said, *more)
-    for name, k in text.items():
+    for k in text.values():
         first = next((row[k] for row in layout.rows if k < len(row)), "")
         read[k] = np.array([first])
     columns = {name: read[k] for name, k in places.items()}
@@ -218,6 +221,18 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
     header = layout.skip and tuple(_head_lines(path, layout))
     return SignalTable(
         columns, layout.sample_rate, layout.start_ns, layout.skip + 1, said, header or ()
+    )
+
+
+def _of_text(layout: Layout, name: str, column: int) -> str:
+    """What is wrong with a column of which most cells are neither numbers nor times."""
+    cells = [row[column] for row in layout.rows if column < len(row) and row[column]]
+    if not cells:
+        return f"column '{name}' is empty; leave it out of the map"
+    clock = ", or give sample_rate (Hz) in place of time" if ":" in cells[0] else ""
+    return (
+        f"column '{name}' holds text, such as {cells[0]!r}, no numbers and no times such as "
+        f"2024-05-01 12:00:00.001; correct it{clock}"
     )
 
 
@@ -239,7 +254,8 @@ def _by_numpy(path: Path, layout: Layout, where: Sequence[int]) -> dict[int, NDA
     stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
     with open(path, encoding=layout.encoding, errors="replace") as stream:
         values = np.loadtxt(
-            layout.plain(stream), delimiter=layout.style.delimiter, usecols=where, comments=None, quotechar='"',
+            layout.plain(stream), delimiter=layout.style.delimiter, usecols=where, comments=None,
+            quotechar='"',
             dtype=np.dtype([(str(k), "i8" if k in stamps else "f8") for k in where]), ndmin=1,
             encoding=None, converters={k: own.add for k, own in stamps.items()},
         )  # fmt: skip
@@ -256,7 +272,7 @@ def _row_by_row(
     InputError that names all bad cells.
     """
     stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
-    bad = BadCells(layout.names, layout.rows and len(layout.rows[0]) or 0)
+    bad = BadCells(layout.names, len(layout.names))
     header = _header_cells(path, layout)
     columns: dict[int, list[float]] = {k: [] for k in where}
     with closing(layout.lines(path)) as lines:
@@ -281,9 +297,9 @@ def _row_by_row(
     kept = np.setdiff1d(np.arange(len(columns[where[0]])), left_out.rows)
     if not every or bad.has_header or any(k in bad.columns for k in stamps):
         bad.require_none(left_out)
-    arrays = {k: np.array(c, np.int64 if k in stamps else np.float64)[kept]
-              for k, c in columns.items()}  # fmt: skip
-    return {k: stamps[k].times(c) if k in stamps else c for k, c in arrays.items()}, left_out.said
+    read: dict[int, NDArray] = {k: np.array(c)[kept] for k, c in columns.items() if k not in stamps}
+    read |= {k: own.times(np.array(columns[k], np.int64)[kept]) for k, own in stamps.items()}
+    return read, left_out.said
 
 
 def _header_cells(path: Path, layout: Layout) -> list[str] | None:

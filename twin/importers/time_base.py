@@ -16,7 +16,6 @@ from twin.logs.log import Array
 from twin.logs.topics import instant
 from twin.numbers import first_not_finite
 
-
 _HOUR, _DAY = 3600.0, 86400.0  # s
 _TIMERS = (2.0**32, 2.0**24, 2.0**16)  # counts of a timer before it begins again
 
@@ -71,7 +70,7 @@ def rows_a_stamp(time: Array) -> float | None:
     """
     edges = np.flatnonzero(np.diff(time) != 0.0)
     lengths = np.diff(edges)
-    few, even = 3, 0.1  # whole stretches; share by which they may differ, and one row
+    few, even = 2, 0.1  # whole stretches; share by which they may differ, and one row
     if len(lengths) < few or np.median(lengths) < 2.0 or (np.diff(time) < 0.0).any():
         return None
     mean = float(np.mean(lengths))

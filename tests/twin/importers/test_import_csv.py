@@ -124,7 +124,7 @@ def test_stamps_with_a_date_are_times(tmp_path: Path, day: str) -> None:
 
 
 def test_stamps_of_no_kind_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
-    text = stamped("2024-05-01").replace("2024-05-01 12", "noon, or 12")
-    with pytest.raises(InputError, match=r"give sample_rate \(Hz\) in place of time|no column 't'"):
+    text = stamped("2024-05-01").replace("2024-05-01 12", "at noon 12")
+    with pytest.raises(InputError, match=r"'t' holds text, such as 'at noon .* sample_rate \(Hz\)"):
         imported(tmp_path, text, CLOCKED)
     assert "# sample_rate = ? # Hz: NOT KNOWN" in guess_map(tmp_path / "log.csv").text

@@ -313,13 +313,14 @@ def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
 def test_counts_have_an_assumed_scale_that_is_told(tmp_path):
     columns = {"t": T, "enc_counts": 1e6 * Q, "speed [counts/s]": 1e6 * V, "u [V]": F}
     found = lines_of(tmp_path, columns)
-    for field, scale in (("position", "1e-06"), ("velocity", "1e-06"), ("force", "1")):
-        assert f", scale = {scale}}}" in found[field]
-        assert "scale ASSUMED" in found[field]
+    metre = "counts_per_metre = 1000000"
+    for field, per in (("position", metre), ("velocity", metre), ("force", "scale = 1")):
+        assert f", {per}}}" in found[field]
+        assert f"{per.split()[0]} ASSUMED" in found[field]
     log = import_log(tmp_path / "a.csv", mapping(tmp_path, guess_map(tmp_path / "a.csv").text))
     np.testing.assert_allclose(log.axes["x"].columns["velocity"], V, atol=1e-9)
     (what,) = assumed(log)
-    assert "position in counts with scale = 1e-06" in what
+    assert "position in counts with counts_per_metre = 1000000" in what
 
 
 def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):

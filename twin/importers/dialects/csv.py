@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
-from twin.importers.mapping import ImportMap, is_unit, raw_unit
+from twin.importers.mapping import ImportMap, is_unit, is_usual_unit, raw_unit
 from twin.importers.stamps import is_date, is_stamp
 from twin.importers.table import SignalTable, parsing
 from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
@@ -112,13 +113,13 @@ def _header(rows: Rows, spaced: Rows, skip: int, header_line: int | None) -> int
 
 def _widths(row: Sequence[str]) -> tuple[int, ...]:
     """How many names a row may have: rows may end in a delimiter, and times have a date before."""
-    dated = any(is_date(a) and is_stamp(b) for a, b in zip(row, row[1:], strict=False))
+    dated = any(is_date(a) and is_stamp(b) for a, b in pairwise(row))
     return (len(row), len(row) - 1) if not row[-1] or dated else (len(row),)
 
 
 def _is_names(cells: Sequence[str]) -> bool:
     """Whether cells are names, and neither units nor numbers nor a line that is drawn."""
-    units = sum(1 for cell in cells if _unit(cell))
+    units = sum(is_usual_unit(cell.strip("[]() ")) for cell in cells)
     words = sum(1 for cell in cells if re.search(r"[^\W\d_]", cell))
     return 2 * units < len(cells) and 2 * words > len(cells)
 

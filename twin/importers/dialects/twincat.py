@@ -1,4 +1,4 @@
-"""TwinCAT Scope's export as text, known by its header: rows of a key and its value for each channel.
+"""TwinCAT Scope's export as text, known by its header: rows of a key and each channel's value.
 
 Source: Beckhoff Infosys, TE13xx TwinCAT 3 Scope View, "Export to CSV". A column under the key is
 that of the times, in ms since the first sample or, as full time stamps, in 100 ns since 1601.
