@@ -15,7 +15,7 @@ NEEDED = (
     "numpy", "pydantic", "pint", "scipy", "numba", "mujoco", "matplotlib", "mcap", "protobuf",
     "zstandard", "lz4", "ruckig", "typer", "rich", "jinja2", "tomlkit", "threadpoolctl",
 )  # fmt: skip
-FOR_IMPORT = ("h5py", "mcap-protobuf-support", "mcap-ros2-support", "pyarrow", "npTDMS")
+FOR_IMPORT = ("h5py", "mcap-protobuf-support", "rosbags", "pyarrow", "npTDMS")
 AGAIN = "pip install --upgrade proton-twin"
 
 

@@ -205,10 +205,11 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     facts = {"original_format": name, "original_sha256": digest}
     scalars = {n: _scalar(n, numbers(n, table.columns[n])) for n in mapping.scalars()}
     columns = {c.name: numbers(c.name, table.columns[c.name]) for c in mapping.columns()}
-    for n, column in columns.items():
-        if hole := table.hole(n, column):
-            raise InputError(hole)
-    said, times = list(table.said), None
+    said: list[str] = list(table.said)
+    times: Array | None = None
+    holes = [hole for n, column in columns.items() if (hole := table.hole(n, column))]
+    if holes and (mapping.resample is None or mapping.time is None):
+        raise InputError(holes[0])
     for axis, field, c in mapping.signals():
         found = find_wraps(columns[c.name])
         if c.wraps is None and found is not None:
@@ -225,6 +226,10 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
         said += jumps
         _common_length({**columns, mapping.time.name: times})
         facts |= _start(table, raw, times)
+        if holes:
+            good = np.all([np.isfinite(c) for c in columns.values()], axis=0)
+            times, columns = times[good], {n: c[good] for n, c in columns.items()}
+            said += [f"{hole.partition(';')[0]}; bridged by a straight line" for hole in holes]
         again = repeated_rows(columns, times)
         if mapping.resample is None and len(again):  # a clock leaves them out, and tells
             times, columns = np.delete(times, again), {

@@ -52,12 +52,27 @@ class SignalTable:
         """Where a column (n,) is not a finite number, and the remedy; None where it always is."""
         if (k := first_not_finite(values)) is None:
             return None
+        if (message := self._message(name, k)) is not None:
+            return (
+                f"{message} has no {name.rpartition('.')[2]} ('{name}'), as "
+                f"{np.count_nonzero(~np.isfinite(values))} of {len(values)} in all; give resample "
+                "(Hz), which bridges it, or leave the signal out of the map"
+            )
         line = "" if self.first_line is None else f" (line {self.first_line + k})"
         return (
             f"column '{name}' is {values[k]} in row {k + 1} of {len(values)}{line}, "
             f"{np.count_nonzero(~np.isfinite(values))} in all; complete or cut out such rows, or "
             "leave the signal out of the map"
         )
+
+    def _message(self, name: str, row: int) -> str | None:
+        """Which message of a bag a row is; None where the table is of none."""
+        for clock, times in self.clocks.items():
+            prefix, _, field = clock.rpartition(".")
+            if field == "log_time" and name.startswith(f"{prefix}.") and row < len(times):
+                since = times[row] - times[0]
+                return f"message {row + 1} ({since / np.timedelta64(1, 's'):.9g} s)"
+        return None
 
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:

@@ -1,4 +1,4 @@
-"""The time base of a file: read in any locale, told where a clock jumps, asked for where unknown."""
+"""The time base of a file: read in any locale, told where a clock jumps, else asked for."""
 
 from __future__ import annotations
 

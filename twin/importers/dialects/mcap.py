@@ -1,108 +1,81 @@
-"""MCAP of other writers: protobuf, JSON and ROS 2 messages; ``twin/importers/messages.py``."""
+"""MCAP of other writers: messages of protobuf, JSON and ROS; see ``twin/importers/messages.py``.
+
+Of a bag that was cut off, has no summary or is damaged somewhere, what whole chunks prove is read.
+"""
 
 from __future__ import annotations
 
 import json
-import struct
-from array import array
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from mcap.opcode import Opcode
 
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
-from twin.importers.messages import LOG_TIME, of_message
-from twin.importers.table import SignalTable, extra, parsing, require_columns
-from twin.logs.container import (
-    IN_CHUNKS,
-    Damaged,
-    FileBytes,
-    Inflation,
-    McapFile,
-    open_chunk,
-    record_at,
-)
-from twin.logs.topics import Topics
+from twin.importers.messages import Messages
+from twin.importers.ros_types import ros_decoder
+from twin.importers.table import SignalTable, extra, parsing
+from twin.logs.bags import BagMessage, open_bag
 
-_MODULES = {"cdr": "mcap_ros2.decoder", "protobuf": "mcap_protobuf.decoder"}
-_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+Decoder = Callable[[bytes], Any]
+READ = "json, protobuf, cdr and ros1"
 
 
 def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of an MCAP file; raises InputError."""
     wanted = mapping.column_names()
-    held: dict[str, array] = {}
-    stamps: set[str] = set()
-    seen: dict[str, None] = {}
-    with parsing("MCAP"):
-        for topic, time, decoded in _messages(path, wanted):
-            values = of_message(topic, decoded)
-            values[f"{topic}.{LOG_TIME}"] = np.datetime64(time, "ns")
-            seen.update(dict.fromkeys(values))
-            for name in wanted or values:
-                if name in values:
-                    value = values[name]
-                    if isinstance(value, np.datetime64):
-                        stamps.add(name)
-                        value = int(value.astype(np.int64))
-                    held.setdefault(name, array("q" if name in stamps else "d")).append(value)
-                elif name in held and name.startswith(f"{topic}."):
-                    raise InputError(f"a message on {topic} at {time} ns has no '{name}'")
-    require_columns(wanted, seen)
-    kinds = {name: "datetime64[ns]" if name in stamps else None for name in wanted or held}
-    return SignalTable({name: np.array(held[name], kind) for name, kind in kinds.items()})
-
-
-def _messages(path: Path, wanted: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-    """Topic, log time in ns and message; of topics not wanted the first alone. Raises Damaged."""
-    topics, shown = Topics(), Counter[int]()
-    decoders: dict[int, Callable[[bytes], Any] | None] = {}
-    with open(path, "rb") as stream:
-        file = McapFile(FileBytes(stream))
-        for opcode, content in _records(file):
-            if opcode != Opcode.MESSAGE:
-                topics.register(opcode, content)
+    messages = Messages(wanted)
+    decoders: dict[int, Decoder | None] = {}
+    unread: dict[str, None] = {}
+    with parsing("MCAP"), open_bag(path) as bag:
+        for m in bag.messages():
+            if not messages.is_wanted(m.channel.id, m.channel.topic):
                 continue
-            number, _, time, _ = _MESSAGE_HEAD.unpack_from(content)
-            channel = topics.channels[number]
-            shown[number] += 1
-            if shown[number] > 1 and not any(
-                w.startswith(f"{channel.topic}.") for w in wanted or (f"{channel.topic}.",)
-            ):
-                continue
-            if number not in decoders:
-                encoding, schema = channel.message_encoding, topics.schemas.get(channel.schema_id)
-                decoders[number] = json.loads if encoding == "json" else None
-                if encoding in _MODULES:
-                    factory = extra(_MODULES[encoding]).DecoderFactory()
-                    decoders[number] = factory.decoder_for(encoding, schema)
-            decode = decoders[number]
-            yield channel.topic, time, decode(content[_MESSAGE_HEAD.size :]) if decode else None
-    # a chunk whose kind is damaged is passed over
-    if file.counts is not None and shown.total() != sum(file.counts.values()):
-        raise Damaged(
-            f"{shown.total()} messages where its statistics announce {sum(file.counts.values())}; "
-            "copy the file again"
-        )
+            if m.channel.id not in decoders:
+                decoders[m.channel.id] = _decoder(m)
+                if decoders[m.channel.id] is None:
+                    unread[_unread(m)] = None
+            decode = decoders[m.channel.id]
+            message = _decoded(m, decode) if decode else None
+            messages.add(m.channel.id, m.channel.topic, message, m.log_time, m.part)
+        lost = tuple(dict.fromkeys(bag.lost))
+    return messages.table(lost, tuple(unread))
 
 
-def _records(file: McapFile) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of schemas, channels and messages, in chunks and outside."""
-    budget = Inflation(file.size)
-    for record in file.records():
-        if record.opcode == Opcode.CHUNK:
-            data, _ = open_chunk(record, budget)
-            offset = 0
-            while offset < len(data):
-                opcode, content, offset = record_at(data, offset)
-                yield opcode, content
-        elif record.opcode in IN_CHUNKS:
-            yield record.opcode, record.content
+def _decoder(m: BagMessage) -> Decoder | None:
+    """What reads the messages of a channel; None where nothing does."""
+    encoding, schema = m.channel.message_encoding, m.schema
+    if encoding == "json":
+        return json.loads
+    if encoding == "protobuf" and schema is not None and schema.encoding == "protobuf":
+        decode: Decoder = extra("mcap_protobuf.decoder").DecoderFactory().decoder_for(
+            encoding, schema)  # fmt: skip
+        return decode
+    if encoding in ("cdr", "ros1") and schema is not None:
+        return ros_decoder(encoding, schema.encoding, schema.name, schema.data)
+    return None
 
 
-DIALECT = Dialect("MCAP of other writers", (".mcap",), read)
+def _decoded(m: BagMessage, decode: Decoder) -> Any:
+    """The message; raises InputError that names topic and time."""
+    try:
+        return decode(m.data)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a library raises on bytes that are none of its
+        raise InputError(
+            f"a message on {m.channel.topic} at {m.log_time} ns cannot be read as "
+            f"{m.channel.message_encoding} ({error}); record it again"
+        ) from error
+
+
+def _unread(m: BagMessage) -> str:
+    schema = "no schema" if m.schema is None else f"a schema of {m.schema.encoding or 'no kind'}"
+    return (
+        f"topic {m.channel.topic} is of encoding {m.channel.message_encoding or 'none'} with "
+        f"{schema}, which is not read; known are {READ}: record or convert it to one of these"
+    )
+
+
+DIALECT = Dialect("MCAP of other writers, such as ROS 2", (".mcap",), read)
