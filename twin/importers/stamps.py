@@ -141,6 +141,8 @@ class Stamps:
         half = ""
         if tail[-1:] in "mM":  # 09.5 PM
             head, tail, half = head + tail[-2:], tail[:-2], tail[-2:]
+        if ";" in tail:  # 03;125
+            tail = tail.replace(";", ".")
         found = self._numbers.get(head)
         if found is not None:  # a minute that was met, and seconds: nearly all
             try:

@@ -248,7 +248,7 @@ def test_what_a_file_states_itself_is_believed(tmp_path, name, write, text, rate
          r"log\.mat: does not state its sample rate"),
         ("log.xyz", changed(write_csv), MAP, r"ends in '\.xyz', known are \.csv"),
         ("log.xyz", changed(write_csv), 'format = "xlsx"\n' + MAP,
-         "format = 'xlsx'; allowed: csv, hdf5"),
+         "format = 'xlsx'; allowed: csv, halsampler"),
         ("none.csv", lambda path: None, MAP, r"none\.csv: cannot be read"),
     ],
 )  # fmt: skip

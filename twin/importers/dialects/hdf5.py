@@ -46,7 +46,8 @@ def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
                     for key, column in (own or {name: values}).items():
                         columns |= split_columns(key, column)
         require_columns(wanted, {**datasets, **columns})  # lists all there are
-        return SignalTable({name: columns[name] for name in chosen(wanted, columns)})
+        notes = tuple(f"{k}: {v}" for k, v in file.attrs.items() if np.size(v) == 1)
+        return SignalTable({name: columns[name] for name in chosen(wanted, columns)}, notes=notes)
 
 
 DIALECT = Dialect("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), read)

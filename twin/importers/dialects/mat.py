@@ -1,6 +1,7 @@
 """MATLAB: versions 4 to 7.2 through SciPy, 7.3 as the HDF5 file it is.
 
-A field of a struct is named ``struct.field``.
+A field of a struct is named ``struct.field``. Simulink's structures with time are
+``name.time`` and, for each signal, ``name.signals.label``; arrays of To File have the times first.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from pathlib import Path
 
 import scipy.io
 from numpy.typing import NDArray
+from scipy.io.matlab import MatlabOpaque
 
+from twin.errors import InputError
 from twin.importers.dialects import Dialect, hdf5
 from twin.importers.mapping import ImportMap
 from twin.importers.nested import flat
@@ -81,7 +84,13 @@ def _inflated(data: bytes) -> Iterator[int]:
 def _load(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
     with parsing("MAT"):
         content = scipy.io.loadmat(path, simplify_cells=True)
-    columns = flat("", {k: v for k, v in content.items() if not k.startswith("__")})
+    opaque = [k for k, v in content.items() if isinstance(v, MatlabOpaque)]
+    columns = flat({k: v for k, v in content.items() if not k.startswith("__")})
+    if opaque and not set(names) <= set(columns):
+        raise InputError(
+            "holds objects of MATLAB, such as timeseries or a Dataset of Simulink, which only "
+            "MATLAB reads; save structures with time, or arrays: t = x.Time; q = x.Data"
+        )
     return {name: columns[name] for name in chosen(names, columns)}
 
 
