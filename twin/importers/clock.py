@@ -15,10 +15,10 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
-from twin.importers.mapping import find_unit, is_unit
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable
 from twin.importers.time_base import rows_a_stamp, times_of
+from twin.importers.units import find_unit, is_unit
 from twin.logs.log import Array
 
 _WORDS = {

@@ -28,8 +28,9 @@ from twin.importers.course import (
     rates,
 )
 from twin.importers.importer import table_of
-from twin.importers.mapping import EVERY_COLUMN, ImportMap, find_unit, is_unit, raw_unit
+from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.table import SignalTable, numbers
+from twin.importers.units import find_unit, is_unit, raw_unit
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER

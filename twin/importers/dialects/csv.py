@@ -15,10 +15,11 @@ from pathlib import Path
 
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
-from twin.importers.mapping import ImportMap, is_unit, is_usual_unit, raw_unit
+from twin.importers.mapping import ImportMap
 from twin.importers.stamps import is_date, is_stamp
 from twin.importers.table import SignalTable, parsing
 from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
+from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 _UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
@@ -43,9 +44,13 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     else:
         spaced = rows
     width = _width(rows)
-    skip = _first_row(rows, width, style, stated.header_line)
-    some = rows[skip :: max(1, (len(rows) - skip) // _SOME)]
+    counting = _counting(rows, width, style)
+    skip = _first_row(rows, counting, style, stated.header_line)
     header = _header(rows, spaced, skip, stated.header_line)
+    if header is not None:  # a row with a bad cell is one, too
+        between = range(header + 1, skip)
+        skip = next((k for k in between if _good(rows[k], counting, style)), skip)
+    some = rows[skip :: max(1, (len(rows) - skip) // _SOME)]
     if header is None:
         names: tuple[str, ...] = tuple(str(k + 1) for k in range(width))
         return Layout(head.encoding, style, names, skip, some)
@@ -59,18 +64,28 @@ def _width(rows: Rows) -> int:
     return Counter(len(row) for row in rows[len(rows) // 2 :]).most_common(1)[0][0]
 
 
-def _is_row(row: Sequence[str], width: int, style: Style) -> bool:
-    """Whether most of its cells are numbers or times."""
-    good = sum(style.is_number(c) or is_stamp(c) or is_date(c) for c in row)
-    filled = sum(1 for cell in row if cell)
-    return len(row) == width and good > 0 and 2 * good >= filled and 2 * filled >= width
+def _counting(rows: Rows, width: int, style: Style) -> tuple[int, ...]:
+    """The columns that hold numbers or times in most rows of the second half."""
+    wide = [row for row in rows[len(rows) // 2 :] if len(row) == width]
+    wide = wide[:: max(1, len(wide) // _SOME)]
+    found = [k for k in range(width) if 2 * sum(_is_value(r[k], style) for r in wide) >= len(wide)]
+    return tuple(found)
 
 
-def _first_row(rows: Rows, width: int, style: Style, header_line: int | None) -> int:
+def _is_value(cell: str, style: Style) -> bool:
+    return style.is_number(cell) or is_stamp(cell) or is_date(cell)
+
+
+def _good(row: Sequence[str], counting: Sequence[int], style: Style) -> int:
+    """How many of the columns that hold numbers or times do so in a row."""
+    return sum(k < len(row) and _is_value(row[k], style) for k in counting)
+
+
+def _first_row(rows: Rows, counting: Sequence[int], style: Style, header_line: int | None) -> int:
     """Index of the first row that is one of the table, as those that follow it are."""
     start = header_line or 0
     looked = 3  # rows: a line with a number above the header is followed by what is none
-    fits = [_is_row(row, width, style) for row in rows]
+    fits = [2 * _good(row, counting, style) > len(counting) for row in rows]
     for index in range(start, len(rows)):
         following = fits[index : index + looked]
         if following[0] and 2 * sum(following) > len(following):
