@@ -17,7 +17,7 @@ from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable
-from twin.importers.time_base import rows_a_stamp, times_of
+from twin.importers.time_base import rate_of_rounded, rows_a_stamp, times_of
 from twin.importers.units import find_unit, is_unit
 from twin.logs.log import Array
 
@@ -87,10 +87,11 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
         return Clock((f"# the file states its sample rate: {rate:g} Hz",), 1.0 / rate,
                      tuple(n for n in columns if is_time(n)))  # fmt: skip
     counters = [name for name, column in columns.items() if counts(name, column)]
-    found = list(_candidates(table, columns, counters))
+    called, even = _candidates(table, columns, counters)
+    stated = stated_rate([*table.notes, *_scalars(table)])
+    found = called or ([] if stated is not None and stated.rate else even[:1])
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
-    stated = stated_rate([*table.notes, *_scalars(table)])
     if found:
         return _of_times(found, counters, stated, used)
     if stated is not None and stated.rate is not None:
@@ -140,8 +141,8 @@ def _continued(column: Array) -> Array:
 
 def _candidates(
     table: SignalTable, columns: Mapping[str, Array], counters: Sequence[str]
-) -> Iterator[_Times]:
-    """The columns that may be those of the times, the surest first."""
+) -> tuple[list[_Times], list[_Times]]:
+    """The columns that are called as times, and others that rise as evenly as these."""
     even, called = [], []
     for name, column in columns.items():
         raw = np.asarray(table.columns[name])
@@ -160,9 +161,19 @@ def _candidates(
         rising, level = float((steps > 0.0).mean()), float((steps == 0.0).mean())
         if calendar or (is_time(name) and (rising > 0.5 or rows_a_stamp(times))):
             called.append(one)
-        elif rising > 0.9 and level == 0.0 and np.ptp(steps) < 0.5 * np.median(steps):
+        elif rising > 0.9 and level == 0.0 and _is_even(steps):
             even.append(one)
-    yield from called or even[:1]
+    return called, even
+
+
+def _is_even(steps: Array) -> bool:
+    """Whether steps (n,) are those of a clock: all alike, or off by chance and not as a motion."""
+    spread, usual = float(np.ptp(steps)), float(np.median(steps))
+    chance = 0.05  # of the spread, by which steps that are off by chance differ from the next one
+    exact = spread < 0.01 * usual
+    return exact or (
+        spread < 0.5 * usual and float(np.mean(np.abs(np.diff(steps)))) > chance * spread
+    )
 
 
 def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
@@ -195,6 +206,9 @@ def _of_times(
         rows = f"each time of {time.name} is that of {coarse * time.step:.4g} rows"
         lines.append(f"sample_rate = {coarse:.6g} # Hz: {rows}")
         return Clock(tuple(lines), 1.0 / coarse, used)
+    if (rounded := rate_of_rounded(time.seconds)) is not None:
+        line = f"sample_rate = {rounded:.9g} # Hz: so many rows a second by {time.name}, which is"
+        return Clock((f"{line} rounded",), 1.0 / rounded, used)
     step = time.step / find_unit(time.unit, "s").size
     lines.append(f"time = {time.entry} # rises by {step:.6g} {time.unit}: {time.reason}{why}")
     lines += [f"# {text}" for text in time.said]

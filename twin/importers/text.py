@@ -160,7 +160,8 @@ class Layout:
         """The names of the columns, with their units unless they are asked for without."""
         units = self.units or ("",) * len(self.names)
         both = zip(self.names, units, strict=True)
-        return [f"{n} [{unit}]" if unit and n not in asked else n for n, unit in both]
+        return [n if not unit or n in asked or n.endswith(("]", ")")) else f"{n} [{unit}]"
+                for n, unit in both]  # fmt: skip
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:

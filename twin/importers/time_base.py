@@ -78,6 +78,34 @@ def rows_a_stamp(time: Array) -> float | None:
     return None if off else len(lengths) * mean / float(time[edges[-1] + 1] - time[edges[0] + 1])
 
 
+def rate_of_rounded(time: Array) -> float | None:
+    """The rate in Hz of times (n,) in s that are even, but printed with few digits; else None.
+
+    None too where they have all digits that they need, so that nothing is rounded.
+    """
+    elapsed = time - time[0]
+    if not (np.diff(elapsed) >= 0.0).all() or elapsed[-1] <= 0.0:
+        return None
+    mean = float(elapsed[-1]) / (len(time) - 1)
+    for digits in range(7):
+        scaled = elapsed * 10.0**digits
+        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
+            break
+    else:
+        return None
+    digit = 10.0**-digits
+    finest = 0.01  # of a period, that a time may be off; coarser digits than these are rounded
+    longer = np.rint(np.diff(elapsed) / digit) > np.floor(mean / digit + 1e-9)
+    few = 5  # steps of each of two lengths; one alone is a row that is lost or there twice
+    if digit < finest * mean or min(longer.sum(), (~longer).sum()) < few:
+        return None
+    for rate in dict.fromkeys((float(round(1.0 / mean)) or 1.0, 1.0 / mean)):
+        off = elapsed - np.arange(len(time)) / rate
+        if np.ptp(off) < 1.001 * digit and abs(1.0 / rate / mean - 1.0) * elapsed[-1] < digit:
+            return rate
+    return None
+
+
 def rate_of(time: Array) -> float:
     """Sample rate in Hz of times (n,) in s.
 
@@ -93,6 +121,8 @@ def rate_of(time: Array) -> float:
     if abs(round(rate) / rate - 1.0) * len(steps) < jitter:
         rate = float(round(rate))
     off = np.abs(elapsed * rate - np.arange(len(time)))
+    if (off > jitter).any() and (rounded := rate_of_rounded(time)) is not None:
+        return rounded
     for fault, wrong in (
         ("does not increase", np.append(False, steps <= 0.0)),
         ("has a gap", np.append(False, steps > 1.5 * period)),

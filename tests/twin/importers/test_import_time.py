@@ -190,3 +190,24 @@ def test_times_are_found_by_their_unit_alone_with_repeats(tmp_path):
     for name in ("micros", "t_us", "us"):
         write_csv(tmp_path / "a.csv", {name: 1e6 * late, **columns})
         assert f'time = {{column = "{name}", unit = "us"}}' in proposed(tmp_path)
+
+
+@pytest.mark.parametrize("rate", [400.0, 800.0, 3200.0])
+def test_times_that_are_printed_with_few_digits_are_even(tmp_path, rate):
+    printed = np.rint(1e3 * np.arange(COUNT) / rate)
+    write_csv(tmp_path / "a.csv", {"ms": printed, "pos_mm": Q, "force_N": F})
+    text = map_of("pos_mm", "force_N", clock="ms in ms")
+    if rate < 1000.0:
+        log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+        assert (log.sample_rate, len(log)) == (rate, COUNT)
+    assert f"sample_rate = {rate:g} # Hz" in proposed(tmp_path)
+
+
+def test_a_motion_that_rises_is_no_time(tmp_path):
+    rising = 30.0 * np.sin(0.5 * T)
+    rng = np.random.default_rng(2)
+    write_csv(tmp_path / "a.csv", {"q": rising, "f": F})
+    assert guess_map(tmp_path / "a.csv").missing[0].startswith("no column rises as times do")
+    uneven = np.cumsum(4.0 + rng.uniform(-0.4, 0.4, COUNT))
+    write_csv(tmp_path / "a.csv", {"a": uneven, "q": rising, "f": F})
+    assert 'time = {column = "a", unit = "ms"}' in proposed(tmp_path)
