@@ -17,7 +17,13 @@ from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable
-from twin.importers.time_base import rate_of_rounded, rows_a_stamp, times_of
+from twin.importers.time_base import (
+    rate_of_rounded,
+    repeated_rows,
+    rows_a_stamp,
+    simple_rate,
+    times_of,
+)
 from twin.importers.units import find_unit, is_unit
 from twin.logs.log import Array
 
@@ -93,7 +99,7 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
     if found:
-        return _of_times(found, counters, stated, used)
+        return _of_times(found, columns, stated, used)
     if stated is not None and stated.rate is not None:
         line = f"sample_rate = {stated.rate:.9g} # Hz: the file states {stated.text!r}"
         return Clock((line,), 1.0 / stated.rate, used)
@@ -193,11 +199,9 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
 
 
 def _of_times(
-    found: Sequence[_Times],
-    counters: Sequence[str],
-    stated: StatedRate | None,
+    found: Sequence[_Times], columns: Mapping[str, Array], stated: StatedRate | None,
     used: tuple[str, ...],
-) -> Clock:
+) -> Clock:  # fmt: skip
     """The time base by the best of several columns of times."""
     time, why = _best(found)
     lines = []
@@ -215,8 +219,10 @@ def _of_times(
     lines += [f"# or: time = {other.entry} # rises by {other.step:.6g} s"
               for other in found if other is not time and other.duration > 0.0]  # fmt: skip
     steps = np.diff(time.seconds)
-    if np.abs(steps - time.step).max() > 0.01 * time.step:  # what is less even needs resample
-        rate = float(f"{1.0 / time.step:.2g}")
+    again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
+    off = np.abs(np.delete(steps, again - 1) - time.step)
+    if len(off) and off.max() > 0.01 * time.step:  # what is less even needs resample
+        rate = simple_rate(1.0 / time.step)
         spread = f"{steps.min() / time.step * step:.4g} to {steps.max() / time.step * step:.4g}"
         lines.append(
             f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}"

@@ -63,6 +63,12 @@ def repeated_rows(columns: Mapping[str, Array], time: Array) -> NDArray[np.intp]
     return np.flatnonzero(same)
 
 
+def simple_rate(rate: float, share: float = 0.01) -> float:
+    """The number with the fewest digits that differs from a rate by less than so large a share."""
+    plain = (float(f"{rate:.{digits}g}") for digits in range(1, 9))
+    return next((p for p in plain if abs(p / rate - 1.0) < share), rate)
+
+
 def rows_a_stamp(time: Array) -> float | None:
     """How many rows have the same time, where each time is that of as many; None where not.
 
@@ -75,7 +81,10 @@ def rows_a_stamp(time: Array) -> float | None:
         return None
     mean = float(np.mean(lengths))
     off = np.abs(lengths - mean).max() > max(1.0, even * mean)
-    return None if off else len(lengths) * mean / float(time[edges[-1] + 1] - time[edges[0] + 1])
+    if off:
+        return None
+    rate = len(lengths) * mean / float(time[edges[-1] + 1] - time[edges[0] + 1])
+    return simple_rate(rate, 1.0 / len(time))  # a row may be before or behind the edges
 
 
 def rate_of_rounded(time: Array) -> float | None:
