@@ -23,11 +23,16 @@ class Wraps:
     def told(self, column: str) -> str:
         """What is wrong with a column of that name."""
         row = int(self.rows[0])
-        more = f", and {len(self.rows) - 1} more times" * (len(self.rows) > 1)
+        more = and_more(len(self.rows))
         return (
             f"column '{column}' jumps by {self.size:g} between rows {row - 1} and {row}{more}: its "
             f"counter begins again after {self.size:g}"
         )
+
+
+def and_more(count: int) -> str:
+    """What is added to the first of so many."""
+    return {1: "", 2: ", and once more"}.get(count, f", and {count - 1} more times")
 
 
 def find_wraps(column: Array) -> Wraps | None:

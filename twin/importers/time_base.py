@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.importers.counters import clock_jumps, without_jumps
+from twin.importers.counters import and_more, clock_jumps, without_jumps
 from twin.importers.mapping import ImportMap
 from twin.importers.table import numbers
 from twin.logs.log import Array
@@ -33,9 +33,7 @@ def times_of(name: str, raw: NDArray, unit: float) -> tuple[Array, tuple[str, ..
         return times, ()
     row = int(jumps.rows[0])
     shown = [_shown(raw[k]) for k in (row - 2, row - 1)]
-    which = f"in row {row} ({shown[0]} is followed by {shown[1]})"
-    if len(jumps.rows) > 1:
-        which += f" and {len(jumps.rows) - 1} more times"
+    which = f"in row {row} ({shown[0]} is followed by {shown[1]}){and_more(len(jumps.rows))}"
     if jumps.size == _HOUR:
         what = f"is put by {_HOUR:g} s {which}: summer time; the hour is taken out"
     elif calendar or jumps.size == _DAY:
