@@ -138,9 +138,10 @@ class _Recording:
             with at(f"column '{mapping.time.name}'"):
                 yield
         except InputError as error:
-            others = [
-                n for n, c in self.table.clocks.items() if n != mapping.time.name and _rises(c)
-            ]
+            own = mapping.time.name
+            rows = len(self.table.columns[own])
+            clocks = {n: c for n, c in self.table.clocks.items() if len(c) == rows and n != own}
+            others = [name for name, c in clocks.items() if _rises(c)]
             hint = f"; the times of '{others[0]}' rise: take these" if others else ""
             raise InputError(f"{error}{hint}") from error
 
