@@ -14,6 +14,7 @@ from identify.cli.shared import app
 NEEDED = (
     "numpy", "pydantic", "pint", "scipy", "numba", "mujoco", "matplotlib", "mcap", "protobuf",
     "zstandard", "lz4", "ruckig", "typer", "rich", "jinja2", "tomlkit", "threadpoolctl",
+    "python-dateutil",
 )  # fmt: skip
 FOR_IMPORT = ("h5py", "mcap-protobuf-support", "rosbags", "pyarrow", "npTDMS")
 AGAIN = "pip install --upgrade proton-twin"

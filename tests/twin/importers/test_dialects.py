@@ -123,3 +123,17 @@ def test_a_pointer_of_git_lfs_is_called_one(tmp_path):
         path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 9\n")
         with pytest.raises(InputError, match="is a pointer of Git LFS"):
             import_log(path, mapping(tmp_path, map_of(name)))
+
+
+def test_a_name_with_a_unit_is_no_entry_of_a_list(tmp_path):
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    rows = list(np.stack([Q, F], axis=1))
+    parquet.write_table(pyarrow.table({"q [mm]": Q, "state": rows}), tmp_path / "a.parquet")
+    entry = '{{column = "{0}", unit = "V", scale = 1.0}}'
+    text = (
+        f"sample_rate = 250.0\n[axes.x]\nposition = {entry.format('q [mm]')}\n"
+        f"force = {entry.format('state[2]')}\n"
+    )
+    axis = import_log(tmp_path / "a.parquet", mapping(tmp_path, text)).axes["x"]
+    np.testing.assert_array_equal(axis.position, Q)
+    np.testing.assert_array_equal(axis.force, F)

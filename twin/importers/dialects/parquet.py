@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,8 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
     parquet = extra("pyarrow.parquet")
     with parsing("Parquet"), parquet.ParquetFile(path) as file:
         wanted = mapping.column_names()
-        columns = read_columns(path, file, [w.partition("[")[0] for w in wanted])
+        bases = (re.sub(r"\[\d+\]$", "", name) for name in wanted)  # an entry of a list
+        columns = read_columns(path, file, [*wanted, *bases])
         require_columns(wanted, {**dict.fromkeys(file.schema_arrow.names), **columns})
         names = chosen(wanted, columns)
         return SignalTable({name: columns[name] for name in names}, notes=notes_of(file))
