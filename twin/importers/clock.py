@@ -60,7 +60,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class _Times:
-    """A column that may be that of the times: (n,) s, or None where its unit is not known."""
+    """A column that may be that of the times, in s (n,), with its unit and what tells that."""
 
     name: str
     seconds: Array
@@ -73,6 +73,11 @@ class _Times:
         """The usual step, s."""
         steps = np.diff(self.seconds)
         return float(np.median(steps[steps > 0.0]))
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether many rows have the time of the row before."""
+        return float((np.diff(self.seconds) == 0.0).mean()) > 0.1
 
     @property
     def duration(self) -> float:
@@ -169,6 +174,7 @@ def _candidates(
             called.append(one)
         elif rising > 0.9 and level == 0.0 and _is_even(steps):
             even.append(one)
+    called.sort(key=lambda one: one.is_coarse)
     return called, even
 
 

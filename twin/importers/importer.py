@@ -22,6 +22,7 @@ from twin.errors import InputError, at
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.mapping import ImportMap
+from twin.importers.stamps import with_times
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable, numbers
 from twin.importers.time_base import (
@@ -193,7 +194,12 @@ def _rises(column: NDArray) -> bool:
 def table_of(path: Path, mapping: ImportMap) -> SignalTable:
     """The columns that a map names, all where it has no axes; raises InputError."""
     require_fetched(path)
-    return all_dialects()[find_dialect(path, mapping.format)].read(path, mapping)
+    return _table(path, mapping, find_dialect(path, mapping.format))
+
+
+def _table(path: Path, mapping: ImportMap, dialect: str) -> SignalTable:
+    table = all_dialects()[dialect].read(path, mapping)
+    return replace(table, columns=with_times(table.columns))
 
 
 def _read(path: Path, mapping: ImportMap) -> _Recording:
@@ -202,7 +208,7 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     name = find_dialect(path, mapping.format)
     with open(path, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    table = all_dialects()[name].read(path, mapping)
+    table = _table(path, mapping, name)
     facts = {"original_format": name, "original_sha256": digest}
     scalars = {n: _scalar(n, numbers(n, table.columns[n])) for n in mapping.scalars()}
     columns = {c.name: numbers(c.name, table.columns[c.name]) for c in mapping.columns()}

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from twin.importers.stamps import is_stamp
 from twin.importers.table import split_columns
 
 ROWS = "data"  # what the rows of a bare list are called
@@ -33,11 +34,15 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             columns |= _flat(f"{name}.", value, names)
-        elif _are_all(dict, value) and not _has_arrays(value[0]):  # a row each
-            columns |= {k: np.array([row.get(k, np.nan) for row in value]) for k in value[0]}
+        elif _is_of_rows(value):
+            above = f"{name}." if prefix or sum(map(_is_of_rows, content.values())) > 1 else ""
+            for k in value[0]:
+                columns[f"{above}{k}"] = np.array([row.get(k, np.nan) for row in value])
         elif _are_all(dict, value):
             for inner, table in _named_tables(name, value):
                 columns |= _flat(inner, table, names)
+        elif _are_all(str, value) and is_stamp(value[0]):
+            columns[name] = np.array(value)
         elif isinstance(value, list) and not _are_all(str, value):
             split = split_columns(name, _numeric(value))
             if len(names) == len(split) > 1:
@@ -54,6 +59,11 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
 
 def _are_all(kind: type, value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(v, kind) for v in value)
+
+
+def _is_of_rows(value: Any) -> bool:
+    """Whether it is a table as a list of rows, each with the names of the columns."""
+    return _are_all(dict, value) and not _has_arrays(value[0])
 
 
 def _has_arrays(table: Mapping[str, Any]) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
@@ -195,6 +196,21 @@ def _day_first(texts: Sequence[str], half_days: bool) -> bool | None:
         days = sorted(_date(m[0], day_first).toordinal() for m in found)
         spans.append(days[-1] - days[0])
     return None if spans[0] == spans[1] else spans[0] < spans[1]
+
+
+def with_times(columns: Mapping[str, NDArray]) -> dict[str, NDArray]:
+    """The same with times where a column (n,) of text holds stamps, or dates, throughout."""
+    out = dict(columns)
+    for name, column in columns.items():
+        if column.ndim != 1 or column.dtype.kind not in "OUS" or not len(column):
+            continue
+        texts = [v.decode() if isinstance(v, bytes) else v for v in column.tolist()]
+        if not isinstance(texts[0], str) or not (is_stamp(texts[0]) or is_date(texts[0])):
+            continue
+        stamps = Stamps("stamp" if is_stamp(texts[0]) else "date")
+        with suppress(ValueError, TypeError, AttributeError):  # what is none stays text
+            out[name] = stamps.times(np.array([stamps.add(text) for text in texts], np.int64))
+    return joined_with_dates(out)
 
 
 def joined_with_dates(columns: Mapping[str, NDArray]) -> dict[str, NDArray]:

@@ -219,10 +219,8 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
         read[k] = np.array([first])
     columns = {name: read[k] for name, k in places.items()}
     columns = {n: c for n, c in joined_with_dates(columns).items() if n in wanted}
-    header = layout.skip and tuple(_head_lines(path, layout))
-    return SignalTable(
-        columns, layout.sample_rate, layout.start_ns, layout.skip + 1, said, header or ()
-    )
+    above = tuple(_head_lines(path, layout))
+    return SignalTable(columns, layout.sample_rate, layout.start_ns, layout.skip + 1, said, above)
 
 
 def _of_text(layout: Layout, name: str, column: int) -> str:

@@ -114,6 +114,8 @@ ROWS = [np.column_stack([k * c for c in run.values()]).tolist() for k, run in en
         ({"tests": [{"rows": rows} for rows in ROWS]}, r"tests\[1\], tests\[2\]"),
         ({"columns": ["t", "q", "f"], "tests": {f"r{k}": rows for k, rows in enumerate(ROWS)}},
          "tests.r0, tests.r1"),
+        ({f"r{k}": [dict(zip("tqf", row, strict=True)) for row in rows]
+          for k, rows in enumerate(ROWS)}, "r0, r1, r2, r3"),
         ({f"r{k}": {n: (k + c).tolist() for n, c in run.items()} for k, run in enumerate(RUNS)},
          "r0, r1, r2, r3"),
     ],

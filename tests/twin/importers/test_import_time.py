@@ -211,3 +211,16 @@ def test_a_motion_that_rises_is_no_time(tmp_path):
     uneven = np.cumsum(4.0 + rng.uniform(-0.4, 0.4, COUNT))
     write_csv(tmp_path / "a.csv", {"a": uneven, "q": rising, "f": F})
     assert 'time = {column = "a", unit = "ms"}' in proposed(tmp_path)
+
+
+def test_stamps_as_text_in_other_formats(tmp_path):
+    stamps = [STAMPS["iso"](NOON + k * STEP) for k in range(COUNT)]
+    columns = {"t": stamps, "q": Q.tolist(), "f": F.tolist()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    for content in (columns, rows):
+        (tmp_path / "a.json").write_text(json.dumps(content))
+        text = map_of("q", "f", clock="t in s")
+        log = import_log(tmp_path / "a.json", mapping(tmp_path, text))
+        assert log.sample_rate == 250.0
+        assert "start_time_unix_ns" in log.metadata
+        assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "a.json").text
