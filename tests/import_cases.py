@@ -111,10 +111,10 @@ def write_parquet(path: Path, columns: dict[str, np.ndarray]) -> None:
     parquet.write_table(pyarrow.table(columns), path, row_group_size=100)
 
 
-def write_tdms(path: Path, columns: dict[str, np.ndarray]) -> None:
-    """Of a waveform at RATE."""
+def write_tdms(path: Path, columns: dict[str, np.ndarray], step: float = 1.0 / RATE) -> None:
+    """Of a waveform with a sample every ``step`` (s)."""
     nptdms = pytest.importorskip("nptdms")
-    period = {"wf_increment": 1.0 / RATE}
+    period = {"wf_increment": step}
     channels = [nptdms.ChannelObject("run", n, c, period) for n, c in columns.items()]
     with nptdms.TdmsWriter(str(path)) as writer:
         writer.write_segment(channels)

@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.door.recordings import CURRENTS, FORCES, Recording, Written
 from twin.errors import InputError
-from twin.importers.mapping import find_unit
+from twin.importers.units import find_unit
 
 ASSUMED = "ASSUMED"
 _KINDS = ("m", "rad", "m/s", "rad/s", "N", "N m", "A")

@@ -15,8 +15,9 @@ from twin.installed import pip_install
 NEEDED = (
     "numpy", "pydantic", "pint", "scipy", "numba", "mujoco", "matplotlib", "mcap", "protobuf",
     "zstandard", "lz4", "ruckig", "typer", "rich", "jinja2", "tomlkit", "threadpoolctl",
+    "python-dateutil",
 )  # fmt: skip
-FOR_IMPORT = ("h5py", "mcap-protobuf-support", "mcap-ros2-support", "pyarrow", "npTDMS")
+FOR_IMPORT = ("h5py", "mcap-protobuf-support", "rosbags", "pyarrow", "npTDMS")
 AGAIN = "pip install --upgrade proton-twin"
 
 

@@ -162,8 +162,8 @@ def _answers(needs: Sequence[Need]) -> Answers:
 
 def _refused(need: Need, said: str) -> str:
     """Why something is no answer to what was asked; empty where it is one."""
-    from twin.importers.mapping import find_unit
     from twin.importers.proposal.text import UNIT
+    from twin.importers.units import find_unit
     from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
     try:

@@ -17,9 +17,10 @@ from twin.signals import Array, stretches
 # Whoever knows it to be right takes the word away.
 ASSUMED = "ASSUMED"
 MAP = "import_map"  # entry of a log's metadata: the map as it was written
+COUNTER = "counter."  # such an entry of an axis' signal, "counter.x.current": that it begins again
 _TABLE = re.compile(r"\[axes\.\"?(\w+)\"?\]")
 _ENTRY = re.compile(r"(\w+)\s*=\s*([^#]*)#(.*)")
-_UNIT = re.compile(r"unit\s*=\s*\"([^\"]*)\"(?:.*\bscale\s*=\s*([^\s,}]+))?")
+_UNIT = re.compile(r"unit\s*=\s*\"([^\"]*)\"(?:.*\b((?:scale|counts_per_\w+)\s*=\s*[^\s,}]+))?")
 
 
 def check_content(axis: Axis) -> Iterator[LogFinding]:
@@ -77,14 +78,20 @@ def assumptions(map_text: str, axis: str) -> list[str]:
         if entry is None or ASSUMED not in entry[3] or table not in (None, axis):
             continue
         unit = _UNIT.search(entry[2])
-        scale = f" with scale = {unit[2]}" if unit and unit[2] else ""
+        scale = f" with {unit[2]}" if unit and unit[2] else ""
         what = f" in {unit[1]}{scale}" if unit else f" = {entry[2].strip()}"
         found.append(entry[1] + what)
     return found
 
 
 def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding]:
-    """A warning where the map that an axis was imported with assumes something."""
+    """What the import of an axis knows: what its map assumes, and counters that begin again."""
+    for key, what in metadata.items():
+        if key.startswith(f"{COUNTER}{axis}."):
+            field = key.rpartition(".")[2]
+            size = what.rpartition(" ")[2]
+            remedy = f"give wraps = {size} for its {field} in the map and import again"
+            yield LogFinding(Severity.ERROR, Fault.WRAPPED, axis, what, WHOLE, remedy)
     if found := assumptions(metadata.get(MAP, ""), axis):
         yield LogFinding(
             Severity.WARNING, Fault.ASSUMED, axis,

@@ -1,6 +1,6 @@
 """Logs of other programs -> Log: one module for each format, and a map that names the columns."""
 
-from twin.importers.importer import import_log
+from twin.importers.importer import import_log, told_of
 from twin.importers.mapping import AxisMap, ColumnMap, ImportMap, load_mapping
 
-__all__ = ["AxisMap", "ColumnMap", "ImportMap", "import_log", "load_mapping"]
+__all__ = ["AxisMap", "ColumnMap", "ImportMap", "import_log", "load_mapping", "told_of"]

@@ -15,16 +15,17 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
+from twin.importers.clock import find_clock
 from twin.importers.importer import table_of
-from twin.importers.mapping import EVERY_COLUMN, ImportMap, find_unit, is_unit
+from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.courses import columns_of
 from twin.importers.proposal.forces import exchanged, with_force
-from twin.importers.proposal.names import names_of, unit_of, units_of, words_of
+from twin.importers.proposal.names import names_of, unit_of, units_of
 from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
 from twin.importers.proposal.signals import Axis, File
 from twin.importers.proposal.text import (
-    SCALE,
+    PER_ONE,
     Answers,
     Entry,
     Need,
@@ -34,13 +35,12 @@ from twin.importers.proposal.text import (
     why_not,
 )
 from twin.importers.table import SignalTable, numbers
+from twin.importers.units import find_unit, is_unit
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 
 Columns = Mapping[str, Array]
 
-_TIME_WORDS = ("time", "timestamp", "stamp", "t", "zeit", "clock")
-_TIME_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _KINDS = tuple(dict.fromkeys((*LINEAR_UNITS.values(), *ROTARY_UNITS.values())))
 
 
@@ -76,7 +76,7 @@ class Proposal:
     """What is proposed for a file.
 
     head: the lines before the axes. tail: those behind them, of columns of no axis. holes: by
-    column, where it has no number.
+    column, where it has no number. timeless: what the file does not tell of its times.
     """
 
     name: str
@@ -85,6 +85,7 @@ class Proposal:
     head: tuple[str, ...]
     tail: tuple[str, ...]
     holes: Mapping[str, str]
+    timeless: tuple[str, ...] = ()
 
     def map_text(self, answers: Answers) -> str:
         """The map, with what the user knows."""
@@ -104,9 +105,9 @@ class Proposal:
         scales = [
             f"axis {n.axis}: the scale of its {n.field} is not known: {n.what}"
             for n in self.needs
-            if n.entry == SCALE and n.key not in answers
+            if n.entry in PER_ONE and n.key not in answers
         ]
-        return (*self.holes.values(), *asked, *scales)
+        return (*self.timeless, *self.holes.values(), *asked, *scales)
 
     @cached_property
     def rows(self) -> list[ColumnRow]:
@@ -145,21 +146,19 @@ def propose(path: Path) -> Proposal:
         columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
-    counters = [n for n, c in columns.items() if _counts(n, c)]
-    time = _time({n: c for n, c in columns.items() if n not in counters})
-    time_base, step = _time_base(columns, time, counters, table.sample_rate)
-    known = time is not None or table.sample_rate is not None
-    moving = {n: c for n, c in columns.items() if n not in (time, *counters) and np.ptp(c) > 0.0}
-    file = File(names_of([*moving]), columns_of(moving), step if known else None)
+    clock = find_clock(table, columns)
+    moving = {n: c for n, c in columns.items() if n not in clock.used and np.ptp(c) > 0.0}
+    known = not clock.missing
+    file = File(names_of([*moving]), columns_of(moving), clock.step if known else None)
     axes = tuple(_axis(file, a, names) for a, names in axes_of(file.names, file.columns).items())
-    used = {time, *(c for axis in axes for c in axis.columns)}
-    taken = {time, *(s.column for axis in axes for s in axis.signals.values())}
+    used = {*clock.used, *(c for axis in axes for c in axis.columns)}
+    taken = {*clock.used, *(s.column for axis in axes for s in axis.signals.values())}
     left = {n: c for n, c in table.columns.items() if n not in used}
     others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
     tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
     missing = {n: hole for n, hole in holes.items() if n in taken}
-    return Proposal(path.name, file, axes, (head, *time_base), tail, missing)
+    return Proposal(path.name, file, axes, (head, *clock.lines), tail, missing, clock.missing)
 
 
 def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
@@ -216,45 +215,6 @@ def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
             out[name] = column
     longest = max((len(c) for c in out.values()), default=0)
     return {name: column for name, column in out.items() if len(column) == longest}, holes
-
-
-def _counts(name: str, column: Array) -> bool:
-    """Whether a column is the number of its row: that tells no time, unless in a unit of it."""
-    return unit_in(name, "s") is None and bool(np.all(np.diff(column) == 1.0))
-
-
-def _time(columns: Columns) -> str | None:
-    """The column of time stamps: it rises, and is called so or rises evenly."""
-    rising = {n: c for n, c in columns.items() if np.mean(np.diff(c) > 0.0) > 0.9}
-    called = [n for n in rising if set(words_of(n)) & set(_TIME_WORDS)]
-    even = [n for n, c in rising.items() if np.ptp(np.diff(c)) < 0.5 * np.median(np.diff(c))]
-    return next(iter([*called, *even]), None)
-
-
-def _time_base(
-    columns: Columns, time: str | None, counters: Sequence[str], stated: float | None
-) -> tuple[list[str], float]:
-    """The lines of the time base, and the step in s."""
-    if stated is not None:
-        return [f"# the file states its sample rate: {stated:g} Hz"], 1.0 / stated
-    if time is None:
-        why = f"{counters[0]} counts the rows" if counters else "no column rises as times do"
-        return [f"sample_rate = 1000.0 # Hz, ASSUMED: {why}"], 1e-3
-    steps = np.diff(columns[time])
-    step = float(np.median(steps[steps > 0.0]))
-    unit, reason = unit_in(time, "s"), "its name states the unit"
-    if unit is None or not is_unit(unit, "s"):
-        slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-        fits = [u for u, size in _TIME_SIZES.items() if slowest <= size / step <= fastest]
-        unit = fits[0] if fits else "s"
-        reason = f"that is {_TIME_SIZES[unit] / step:.6g} Hz"
-    seconds = step * find_unit(unit, "s").size
-    lines = [f"time = {_table(time, unit)} # rises by {step:.6g} {unit}: {reason}"]
-    if np.abs(steps - step).max() > 0.01 * step:  # of a step; what is less even needs resample
-        rate = float(f"{1.0 / seconds:.2g}")
-        spread = f"{steps.min():.4g} to {steps.max():.4g} {unit}"
-        lines.append(f"resample = {rate:g} # Hz, because the steps are uneven: {spread}")
-    return lines, seconds
 
 
 def _table(name: str, unit: str | None) -> str:

@@ -10,42 +10,37 @@ power is lost in it, the forces at the joints are R^T times those of the motors.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from twin.errors import InputError, at
-from twin.importers import csv_text
-from twin.importers.formats import (
-    read_hdf5,
-    read_json,
-    read_mat,
-    read_mcap,
-    read_parquet,
-    read_tdms,
-)
+from twin.importers.counters import find_wraps, unwrapped
+from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.mapping import ImportMap
+from twin.importers.stamps import with_times
+from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable, numbers
-from twin.importers.time_base import TimeBase, even_times, rate_of, time_base_of
-from twin.logs.container import reading
+from twin.importers.time_base import (
+    TimeBase,
+    even_times,
+    rate_of,
+    repeated_rows,
+    time_base_of,
+    times_of,
+)
+from twin.logs.container import reading, require_fetched
 from twin.logs.log import HELD, Array, AxisLog, Log
 from twin.logs.topics import instant, is_calendar
 from twin.numbers import independent
 
 Columns = Mapping[str, Array]
 Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint -> ratio
-FORMATS: Mapping[str, tuple[tuple[str, ...], Callable[[Path, ImportMap], SignalTable]]] = {
-    "csv": ((".csv", ".txt", ".tsv", ".dat", ".asc"), csv_text.read),
-    "mat": ((".mat",), read_mat),
-    "hdf5": ((".h5", ".hdf5", ".hdf", ".he5"), read_hdf5),
-    "parquet": ((".parquet", ".pq"), read_parquet),
-    "json": ((".json",), read_json),
-    "tdms": ((".tdms",), read_tdms),
-    "mcap": ((".mcap",), read_mcap),
-}
-"""Each format by name: how its files end, and what reads them."""
+_NOTE = "note_"  # entries of a log's metadata: what was done as it was imported
 
 
 def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> Log:
@@ -64,17 +59,22 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
             f"{len(paths)} files are given; several need a table [[files]] for each in the map"
         )
     with reading(paths[0]):
-        table, columns, facts, scalars = _read(paths[0], mapping)
-        mapping = mapping.scaled_by(scalars, 1)
-        facts |= _start(table, mapping, columns)
-        if mapping.resample is None or mapping.time is None:
-            return _log(mapping, columns, _sample_rate(table, mapping, columns), facts)
-        with at(f"column '{mapping.time.name}'"):
-            base = time_base_of(mapping.time.to_si(columns[mapping.time.name]), mapping.resample)
-        even = {n: base.resampled(c) for n, c in columns.items() if n != mapping.time.name}
+        recording = _read(paths[0], mapping)
+        mapping = mapping.scaled_by(recording.scalars, 1)
+        columns, facts = recording.columns, recording.facts
+        if mapping.resample is None or recording.times is None:
+            return _log(mapping, columns, recording.rate(mapping), facts)
+        with recording.at_time(mapping):
+            base = time_base_of(recording.times, mapping.resample)
+        even = {n: base.resampled(c) for n, c in columns.items()}
         if not base.leaves_all:
             facts["resampled"] = base.costs(mapping, columns)
         return _log(mapping, even, mapping.resample, facts)
+
+
+def told_of(log: Log) -> list[str]:
+    """What was done to a recording as it was imported, a sentence each."""
+    return [v for k, v in log.metadata.items() if k.startswith((_NOTE, "resampled"))]
 
 
 def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
@@ -91,11 +91,13 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
         with reading(path):
-            table, columns, of_file, scalars = _read(path, own)
-            own, mapping = (m.scaled_by(scalars, number) for m in (own, mapping))
-            times = _times(table, own, columns) + files[number - 1].offset
-            bases.append((own, columns, time_base_of(times, rate)))
-        facts = {key: ",".join(filter(None, (facts.get(key), of_file[key]))) for key in of_file}
+            recording = _read(path, own)
+            own, mapping = (m.scaled_by(recording.scalars, number) for m in (own, mapping))
+            times = recording.absolute_times(own) + files[number - 1].offset
+            with recording.at_time(own):
+                bases.append((own, recording.columns, time_base_of(times, rate)))
+        for key, fact in recording.facts.items():
+            facts[key] = ",".join(filter(None, (facts.get(key), fact)))
     begin = max(base.times[0] for _, _, base in bases)
     end = min(base.times[-1] for _, _, base in bases)
     if not (end - begin) * rate >= 2.0:
@@ -114,40 +116,137 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     return _log(mapping, even, rate, facts)
 
 
-def _times(table: SignalTable, mapping: ImportMap, columns: Columns) -> Array:
-    """The times (n,) of the rows of one of several files, s."""
-    if mapping.time is None:
-        rate = _sample_rate(table, mapping, columns)
-        return np.arange(_common_length(columns)) / rate
-    times = mapping.time.to_si(columns[mapping.time.name])
-    start = _start(table, mapping, columns).get("start_time_unix_ns")
-    if start is not None and not is_calendar(times[0]):  # dates: seconds since the first
-        times = times - times[0] + int(start) * 1e-9
-    return times
+@dataclass(frozen=True)
+class _Recording:
+    """A file as it was read: its signals by column, times (n,) in s, None where it has none.
+
+    facts: for the metadata of the log. scalars: the values that scales name.
+    """
+
+    table: SignalTable
+    columns: Columns
+    times: Array | None
+    facts: dict[str, str]
+    scalars: Mapping[str, float]
+
+    @contextmanager
+    def at_time(self, mapping: ImportMap) -> Iterator[None]:
+        """Name the column of the times in an error, and offer another that would do."""
+        if mapping.time is None:
+            yield
+            return
+        try:
+            with at(f"column '{mapping.time.name}'"):
+                yield
+        except InputError as error:
+            own = mapping.time.name
+            rows = len(self.table.columns[own])
+            clocks = {n: c for n, c in self.table.clocks.items() if len(c) == rows and n != own}
+            others = [name for name, c in clocks.items() if _rises(c)]
+            hint = f"; the times of '{others[0]}' rise: take these" if others else ""
+            raise InputError(f"{error}{hint}") from error
+
+    def rate(self, mapping: ImportMap) -> float:
+        """Its sample rate in Hz; raises InputError where it is not known or not even."""
+        stated = stated_rate(self.table.notes)
+        if self.times is not None:
+            with self.at_time(mapping):
+                rate = rate_of(self.times)
+            self._compare(stated, rate, "its times give")
+            return rate
+        given, own = mapping.sample_rate, self.table.sample_rate
+        rate = given or own or (stated.rate if stated else None) or 0.0
+        if not rate:
+            raise InputError(
+                "does not state its sample rate; give sample_rate (Hz) or time "
+                '({column = "t", unit = "s"}) in the map'
+            )
+        if own is not None and abs(own - rate) > 1e-6 * rate:
+            raise InputError(
+                f"is sampled at {own:.9g} Hz, the map says {rate:.9g} Hz; "
+                "correct sample_rate in the map or leave it out"
+            )
+        self._compare(stated, rate, "the map says")
+        return rate
+
+    def _compare(self, stated: StatedRate | None, rate: float, what: str) -> None:
+        """Tell where a line of the file states another rate, which may be of another clock."""
+        off = 0.02  # of the rate, by which a clock is not another
+        if stated is not None and stated.rate and abs(stated.rate / rate - 1.0) > off:
+            self.facts[f"{_NOTE}rate"] = (
+                f"the file states {stated.rate:.6g} Hz ({stated.text!r}), {what} {rate:.6g} Hz"
+            )
+
+    def absolute_times(self, mapping: ImportMap) -> Array:
+        """The times (n,) of its rows in s, since 1970 where that is known."""
+        if self.times is None:
+            return np.arange(_common_length(self.columns)) / self.rate(mapping)
+        start = self.facts.get("start_time_unix_ns")
+        if start is not None and not is_calendar(self.times[0]):  # dates: seconds since the first
+            return self.times - self.times[0] + int(start) * 1e-9
+        return self.times
+
+
+def _rises(column: NDArray) -> bool:
+    return bool(len(column) > 1 and (np.diff(column.astype(np.int64)) > 0).all())
 
 
 def table_of(path: Path, mapping: ImportMap) -> SignalTable:
     """The columns that a map names, all where it has no axes; raises InputError."""
-    return FORMATS[_format_name(path, mapping)][1](path, mapping)
+    require_fetched(path)
+    return _table(path, mapping, find_dialect(path, mapping.format))
 
 
-def _read(
-    path: Path, mapping: ImportMap
-) -> tuple[SignalTable, Columns, dict[str, str], dict[str, float]]:
-    """The table, its columns as numbers, format and sha256 of the file, and scalars by name."""
-    name = _format_name(path, mapping)
+def _table(path: Path, mapping: ImportMap, dialect: str) -> SignalTable:
+    table = all_dialects()[dialect].read(path, mapping)
+    return replace(table, columns=with_times(table.columns))
+
+
+def _read(path: Path, mapping: ImportMap) -> _Recording:
+    """What a map names of a file; raises InputError."""
+    require_fetched(path)
+    name = find_dialect(path, mapping.format)
     with open(path, "rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    table = table_of(path, mapping)
-    columns = {n: numbers(n, raw) for n, raw in table.columns.items()}
-    scalars = {n: _scalar(n, columns[n]) for n in mapping.scalars()}
-    for c in mapping.columns():
-        if hole := table.hole(c.name, columns[c.name]):
-            raise InputError(hole)
-    signals = {c.name for c in mapping.columns()} | ({mapping.time.name} if mapping.time else set())
-    columns = {n: c for n, c in columns.items() if n in signals}
+    table = _table(path, mapping, name)
+    facts = {"original_format": name, "original_sha256": digest}
+    scalars = {n: _scalar(n, numbers(n, table.columns[n])) for n in mapping.scalars()}
+    columns = {c.name: numbers(c.name, table.columns[c.name]) for c in mapping.columns()}
+    said: list[str] = list(table.said)
+    times: Array | None = None
+    holes = [hole for n, column in columns.items() if (hole := table.hole(n, column))]
+    if holes and (mapping.resample is None or mapping.time is None):
+        raise InputError(holes[0])
+    for axis, field, c in mapping.signals():
+        found = find_wraps(columns[c.name])
+        if c.wraps is None and found is not None:
+            facts[f"counter.{axis}.{field}"] = found.told(c.name)
+        elif c.wraps is not None:
+            said.append(f"column '{c.name}': a counter that begins again after {c.wraps:g} goes on")
+            columns[c.name] = unwrapped(columns[c.name], c.wraps)
     _common_length(columns)
-    return table, columns, {"original_format": name, "original_sha256": digest}, scalars
+    if mapping.time is not None:
+        raw = np.asarray(table.columns[mapping.time.name])
+        if raw.dtype.kind in "Mm" and mapping.time.seconds != 1.0:
+            raise InputError(f"column '{mapping.time.name}' holds dates; state its unit as s")
+        times, jumps = times_of(mapping.time.name, raw, mapping.time.seconds)
+        said += jumps
+        _common_length({**columns, mapping.time.name: times})
+        facts |= _start(table, raw, times)
+        if holes:
+            good = np.all([np.isfinite(c) for c in columns.values()], axis=0)
+            times, columns = times[good], {n: c[good] for n, c in columns.items()}
+            said += [f"{hole.partition(';')[0]}; bridged by a straight line" for hole in holes]
+        again = repeated_rows(columns, times)
+        if mapping.resample is None and len(again):  # a clock leaves them out, and tells
+            times, columns = np.delete(times, again), {
+                n: np.delete(c, again) for n, c in columns.items()}  # fmt: skip
+            rows = f"row {again[0] + 1}" + f" and {len(again) - 1} more" * (len(again) > 1)
+            said.append(f"{rows}: what the row before says, once more; left out")
+    elif table.start_ns is not None:
+        facts["start_time_unix_ns"] = str(table.start_ns)
+    facts |= {f"{_NOTE}{k}": text for k, text in enumerate(said, 1)}
+    return _Recording(table, columns, times, facts, scalars)
 
 
 def _scalar(name: str, values: Array) -> float:
@@ -178,6 +277,9 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
         for field, c in axis.columns.items():
             rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
             signals[field] = c.to_si(columns[c.key][rows])
+            if axis.side_of(field) == "load":  # what at_joints brings to the load is the motor's
+                (ratio,) = axis.ratios(name).values()
+                signals[field] = signals[field] * (1.0 / ratio if field in HELD else ratio)
             if not np.isfinite(signals[field]).all():
                 raise InputError(
                     f"axes.{name}.{field} is too large for a number after unit, scale and offset; "
@@ -185,34 +287,18 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
                 )
         axes[name] = AxisLog(signals, axis.units, axis.force_constant)
     metadata = {"source": "import", "import_map": mapping.text, **facts}
-    gears = {name: axis.gear for name, axis in mapping.axes.items() if axis.gear}
+    gears = {name: gear for name, axis in mapping.axes.items() if (gear := axis.ratios(name))}
     return Log(rate, at_joints(axes, gears), metadata)
 
 
-def _start(table: SignalTable, mapping: ImportMap, columns: Columns) -> dict[str, str]:
+def _start(table: SignalTable, raw: NDArray, times: Array) -> dict[str, str]:
     """When the recording began by the wall clock, where the format or its times say so."""
     start = table.start_ns
-    if start is None and mapping.time is not None:
-        raw = np.asarray(table.columns[mapping.time.name])
-        (first,) = mapping.time.to_si(columns[mapping.time.name][:1])
-        if raw.dtype.kind == "M":
-            start = int(raw[0].astype("datetime64[ns]").astype(np.int64))
-        elif is_calendar(first):
-            start = round(float(first) * 1e9)
+    if start is None and raw.dtype.kind == "M" and len(raw):
+        start = int(raw[0].astype("datetime64[ns]").astype(np.int64))
+    elif start is None and raw.dtype.kind != "m" and len(times) and is_calendar(times[0]):
+        start = round(float(times[0]) * 1e9)
     return {} if start is None else {"start_time_unix_ns": str(start)}
-
-
-def _format_name(path: Path, mapping: ImportMap) -> str:
-    by_ending = {ending: name for name, (endings, _) in FORMATS.items() for ending in endings}
-    name = mapping.format
-    if name is None and (name := by_ending.get(path.suffix.lower())) is None:
-        raise InputError(
-            f"ends in '{path.suffix}', known are {', '.join(by_ending)}; state format in the map: "
-            f"{', '.join(FORMATS)}"
-        )
-    if name not in FORMATS:
-        raise InputError(f"the map gives format = '{name}'; allowed: {', '.join(FORMATS)}")
-    return name
 
 
 def _common_length(columns: Columns) -> int:
@@ -226,26 +312,6 @@ def _common_length(columns: Columns) -> int:
     if len(values) < 2:
         raise InputError(f"has {len(values)} rows; a log has at least 2")
     return len(values)
-
-
-def _sample_rate(table: SignalTable, mapping: ImportMap, columns: Columns) -> float:
-    if mapping.time is not None:
-        dated = table.columns[mapping.time.name].dtype.kind == "M"
-        if dated and mapping.time.seconds != 1.0:
-            raise InputError(f"column '{mapping.time.name}' holds dates; state its unit as s")
-        with at(f"column '{mapping.time.name}'"):
-            return rate_of(mapping.time.to_si(columns[mapping.time.name]))
-    if (rate := mapping.sample_rate or table.sample_rate) is None:
-        raise InputError(
-            "does not state its sample rate; give sample_rate (Hz) or time "
-            '({column = "t", unit = "s"}) in the map'
-        )
-    if table.sample_rate is not None and abs(table.sample_rate - rate) > 1e-6 * rate:
-        raise InputError(
-            f"is sampled at {table.sample_rate:.9g} Hz, the map says {rate:.9g} Hz; "
-            "correct sample_rate in the map or leave it out"
-        )
-    return rate
 
 
 def at_joints(axes: Mapping[str, AxisLog], gears: Gears) -> dict[str, AxisLog]:

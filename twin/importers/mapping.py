@@ -6,7 +6,10 @@
     force_constant = 53.4                 # N/A, optional
     position = {column = "qm", unit = "mm"}
     force = {column = "drive", unit = "V", scale = 35.15}     # N a volt; or scale = "gtau"
-    gear = {x = 32.0}                     # the columns are those of a motor, 32 turns for one
+    gear = 32.0                           # the columns are those of a motor, 32 turns for one
+
+A counter has unit = "counts" with counts_per_turn or counts_per_metre, and where it begins again
+wraps, such as 65536.
 
 Several files are given in the order of [[files]] tables, each with time or sample_rate and an
 offset (s) that is added to its times; a column of the second one says file = 2.
@@ -19,12 +22,8 @@ as many.
 
 from __future__ import annotations
 
-import difflib
 import math
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -33,121 +32,10 @@ from pydantic import Field, PrivateAttr
 
 from twin.entries import Entries, read_entries, toml_document
 from twin.errors import InputError, at
+from twin.importers.units import COUNTS, Unit, find_unit
 from twin.logs.container import reading
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
-
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
-_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}
-_ANGLE = {
-    "rad": 1.0,
-    "mrad": 1e-3,
-    "urad": 1e-6,
-    "deg": math.radians(1.0),
-    "°": math.radians(1.0),
-    "arcmin": math.radians(1.0 / 60.0),
-    "arcsec": math.radians(1.0 / 3600.0),
-    "rev": 2.0 * math.pi,
-}
-_PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6}
-
-
-def _per(units: Mapping[str, float], power: int) -> dict[str, float]:
-    """``units`` divided by a time to some power: mm/s, um/ms^2."""
-    suffix = "" if power == 1 else f"^{power}"
-    return {
-        f"{unit}/{time}{suffix}": size / seconds**power
-        for time, seconds in _TIME.items()
-        for unit, size in units.items()
-    }
-
-
-def _prefixed(unit: str) -> dict[str, float]:
-    return {prefix + unit: size for prefix, size in _PREFIXES.items()}
-
-
-# SI unit -> units of the same quantity, each in SI
-_QUANTITIES: Mapping[str, Mapping[str, float]] = {
-    "s": _TIME,
-    "m": _LENGTH,
-    "m/s": _per(_LENGTH, 1),
-    "m/s^2": {**_per(_LENGTH, 2), "g": 9.80665},
-    "rad": _ANGLE,
-    "rad/s": {**_per(_ANGLE, 1), "rpm": 2.0 * math.pi / 60.0},
-    "rad/s^2": _per(_ANGLE, 2),
-    "A": _prefixed("A"),
-    "N": _prefixed("N"),
-    "N m": {**_prefixed("Nm"), "mNmm": 1e-6, "Nmm": 1e-3, "Ncm": 1e-2},
-}
-# what only a scale turns into a physical quantity
-_RAW = ("V", "mV", "count", "counts", "increment", "increments", "digit", "digits", "%", "1")
-_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^· ]{0,30}$")
-_SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "·": "", "*": "", " ": ""})
-
-
-@dataclass(frozen=True)
-class Unit:
-    """One of the unit in SI, and the SI unit; ``si`` is None where the map must give a scale."""
-
-    size: float
-    si: str | None
-
-
-def find_unit(text: str, *allowed: str) -> Unit:
-    """The unit ``text`` of quantities with the SI units ``allowed``; InputError suggests one."""
-    plain = text.translate(_SPELLINGS)
-    if plain.endswith(("/s2", "/ms2")):
-        plain = plain[:-1] + "^2"
-    for si in allowed:
-        if plain in _QUANTITIES[si]:
-            return Unit(_QUANTITIES[si][plain], si)
-    if plain in _RAW:
-        return Unit(1.0, None)
-    for si in allowed:
-        if (size := _size_by_library(text.strip(), si)) is not None:
-            return Unit(size, si)
-    known = [unit for si in allowed for unit in _QUANTITIES[si]]
-    by_lower = {unit.lower(): unit for unit in reversed(known)}
-    near = difflib.get_close_matches(plain.lower(), by_lower, n=1, cutoff=0.55)
-    hint = f"did you mean '{by_lower[near[0]]}'? " if near else ""
-    raise InputError(
-        f"unit '{text}' is not known here; {hint}give a unit of {' or '.join(allowed)} "
-        f"({', '.join(known[:6])}, ...), or V or counts with a scale"
-    )
-
-
-def is_unit(text: str | None, *kinds: str) -> bool:
-    """Whether it is a unit of one of these quantities (SI units)."""
-    try:
-        return text is not None and find_unit(text, *kinds).si is not None
-    except InputError:
-        return False
-
-
-def raw_unit(text: str | None) -> str | None:
-    """The unit of no quantity in a text: the counts of "counts/s"; None where there is none."""
-    plain = (text or "").partition("/")[0]
-    return plain if plain in _RAW else None
-
-
-def _size_by_library(text: str, si: str) -> float | None:
-    """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity."""
-    if "rad" in si or not _WORD.search(text):  # angles have no dimension there: anything would do
-        return None
-    try:
-        return float(_registry()(re.sub(r"[· ]+", "*", text)).to(si.replace(" ", "*")).magnitude)
-    except Exception:  # whatever a parser of any text may raise: then it is no unit
-        return None
-
-
-@cache
-def _registry() -> Any:
-    import pint  # takes a second to load, for the few who need it
-
-    return pint.UnitRegistry()
-
-
-# --- the map --------------------------------------------------------------------------------------
 
 NUMBER = "a finite number"
 AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
@@ -163,14 +51,21 @@ class _Column(Entries):
 
 
 class TimeMap(_Column):
-    """The column of the time stamps."""
+    """The column of the time stamps, or of a counter of the samples."""
 
-    unit: str = Field(description='a unit of time in quotes, such as "s", "ms" or "us"')
+    unit: str | None = Field(
+        None, description='a unit of time in quotes, such as "s", "ms" or "us"; or step'
+    )
+    step: float | None = Field(
+        None, gt=0.0, description="a number above 0: s for one, of a column that counts the samples"
+    )
 
     @property
     def seconds(self) -> float:
         """One of its unit, s; raises InputError for what is no unit of time."""
-        return find_unit(self.unit, "s").size
+        if (self.unit is None) == (self.step is None):
+            raise InputError('give unit, such as "s", or step (s for one, of a counter of samples)')
+        return self.step or find_unit(self.unit or "", "s").size
 
     def to_si(self, raw: Array) -> Array:
         """Times (n,) of the column in s."""
@@ -190,6 +85,19 @@ class ColumnMap(_Column):
         0, ge=-(10**6), le=10**6,
         description="a whole number: by how many samples the column was recorded too late",
     )  # fmt: skip
+    counts_per_turn: float | None = Field(
+        None, gt=0.0, description="a number above 0: counts of the encoder in one turn"
+    )
+    counts_per_metre: float | None = Field(
+        None, gt=0.0, description="a number above 0: counts of the encoder in one metre"
+    )
+    wraps: float | None = Field(
+        None, gt=0.0,
+        description="a number above 0: counts after which the counter begins again, such as 65536",
+    )  # fmt: skip
+    side: Literal["motor", "load"] | None = Field(
+        None, description='"motor" or "load": on which side of the gear it is measured'
+    )
     file: int = Field(
         1, ge=1, le=1000, description="a whole number: which of several files, the first is 1"
     )
@@ -209,8 +117,14 @@ class ColumnMap(_Column):
         """Find the unit, of a signal of that name; raises InputError where there is none."""
         either = dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field]))
         self._si = find_unit(self.unit, *either)
-        if self.si.si is None and "scale" not in self.model_fields_set:
-            raise InputError(f"unit '{self.unit}' needs a scale: how much one of it is in SI")
+        counted = self._per_count(field)
+        if counted is not None:
+            self._si = counted
+        elif self.si.si is None and "scale" not in self.model_fields_set:
+            how = "a scale: how much one of it is in SI"
+            if self.is_counted and len(either) > 1 and not field.endswith("force"):
+                how = "counts_per_turn or counts_per_metre of the encoder"
+            raise InputError(f"unit '{self.unit}' needs {how}")
         if self.scale == 0.0:
             raise InputError("scale = 0: give a number other than 0")
         if isinstance(self.scale, str) and not self.scale.strip("+-.0123456789eE"):
@@ -218,6 +132,29 @@ class ColumnMap(_Column):
                 f"scale = '{self.scale}': give a finite number without quotes, or the name of a "
                 "scalar of the file"
             )
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether its unit is that of a counter."""
+        return self.unit.partition("/")[0].strip() in COUNTS
+
+    def _per_count(self, field: str) -> Unit | None:
+        """One of its counts in SI, where an encoder tells; None where the map has none."""
+        per = {"counts_per_turn": self.counts_per_turn, "counts_per_metre": self.counts_per_metre}
+        given = {name: counts for name, counts in per.items() if counts is not None}
+        if not given:
+            return None
+        name, counts = next(iter(given.items()))
+        si = (ROTARY_UNITS if name == "counts_per_turn" else LINEAR_UNITS)[field]
+        if len(given) > 1 or not self.is_counted or field in ("current", "force"):
+            raise InputError(
+                f"{name} = {counts:g}: give one of {' and '.join(per)}, of a position or velocity "
+                'with unit = "counts" (or "counts/s")'
+            )
+        if "scale" in self.model_fields_set:
+            raise InputError(f"scale and {name} are both given; give one of them")
+        turn = 2.0 * math.pi if name == "counts_per_turn" else 1.0
+        return Unit(self.si.size * turn / counts, si)
 
     def to_si(self, raw: Array) -> Array:
         """Values (n,) of the column in SI."""
@@ -235,11 +172,17 @@ class AxisMap(Entries):
     force_constant: float | None = Field(
         None, gt=0.0, description="a number above 0, in N/A (N m/A on a rotary axis)"
     )
-    gear: dict[str, float] | None = Field(
-        None, min_length=1,
-        description="turns of this axis' motor, whose signals are mapped, for one of each joint, "
-        "such as {elbow = 32.0, wrist = 32.0}; the log then has the signals of the joints",
-    )  # fmt: skip
+    gear: float | dict[str, float] | None = Field(
+        None,
+        description="turns of this axis' motor, whose signals are mapped, for one of the load: a "
+        "number other than 0; or for one of each joint, such as {elbow = 32.0, wrist = 32.0}; the "
+        "log then has the signals of the loads",
+    )
+    side: Literal["motor", "load"] = Field(
+        "motor",
+        description='"motor" or "load": on which side of the gear position and velocity are '
+        "measured; current and force are the motor's, unless a column says its own side",
+    )
     setpoint_position: ColumnMap | None = _SIGNAL
     setpoint_velocity: ColumnMap | None = _SIGNAL
     setpoint_acceleration: ColumnMap | None = _SIGNAL
@@ -258,6 +201,15 @@ class AxisMap(Entries):
         """SI unit of every field."""
         return ROTARY_UNITS if self._has(ROTARY_UNITS) else LINEAR_UNITS
 
+    def ratios(self, name: str) -> dict[str, float]:
+        """Turns of the motor of the axis called ``name`` for one of each load; none: its own."""
+        return self.gear if isinstance(self.gear, dict) else {name: self.gear} if self.gear else {}
+
+    def side_of(self, field: str) -> str:
+        """On which side of the gear a signal is measured."""
+        column = self.columns[field]
+        return column.side or ("motor" if field in ("current", "force") else self.side)
+
     def require_signals(self) -> None:
         """Find the units; raises InputError where one or a signal is missing or of another kind."""
         for field, column in self.columns.items():
@@ -265,7 +217,19 @@ class AxisMap(Entries):
                 column.require_unit(field)
         if "position" not in self.columns or not {"current", "force"} & set(self.columns):
             raise InputError("an axis needs position and one of current and force; map both")
+        if self.gear in ({}, 0.0):
+            raise InputError("gear: give a number other than 0, or one for each joint")
+        sided = any(c.side for c in self.columns.values()) or "side" in self.model_fields_set
+        if sided and (self.gear is None or isinstance(self.gear, dict)):
+            raise InputError("side: needs the ratio of the gear; give gear, such as gear = 10.0")
         linear, rotary = self._has(LINEAR_UNITS), self._has(ROTARY_UNITS)
+        counted = [f for f, c in self.columns.items() if c.is_counted and c.si.si is None]
+        if counted and counted != ["current"] and not linear and not rotary:
+            raise InputError(
+                f"{counted[0]}: counts with a scale are of an axis that turns or one that travels; "
+                "say which: counts_per_turn or counts_per_metre in place of the scale, or "
+                'unit = "rad" or "m" with it'
+            )
         if linear and rotary:
             raise InputError(
                 f"{linear[0]} has a linear unit, {rotary[0]} a rotary one; give both of one kind "
@@ -319,7 +283,11 @@ class ImportMap(_File):
 
     def columns(self) -> list[ColumnMap]:
         """The columns of all signals."""
-        return [c for axis in self.axes.values() for c in axis.columns.values()]
+        return [c for _, _, c in self.signals()]
+
+    def signals(self) -> list[tuple[str, str, ColumnMap]]:
+        """Axis, field and column of all signals."""
+        return [(a, f, c) for a, axis in self.axes.items() for f, c in axis.columns.items()]
 
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""

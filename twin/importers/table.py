@@ -33,24 +33,47 @@ SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 class SignalTable:
     """Columns as in the file; sample_rate (Hz), start_ns (since 1970): where it states them.
 
-    first_line: that of the first row, in a file of text.
+    first_line: that of the first row, in a file of text. said: what was left out of it or lost, a
+    sentence each. notes: what its writer says of it as text, such as the lines above the names.
     """
 
     columns: Mapping[str, NDArray]
     sample_rate: float | None = None
     start_ns: int | None = None
     first_line: int | None = None
+    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def clocks(self) -> Mapping[str, NDArray]:
+        """Its columns that are times of a calendar."""
+        return {name: c for name, c in self.columns.items() if np.asarray(c).dtype.kind == "M"}
 
     def hole(self, name: str, values: Array) -> str | None:
         """Where a column (n,) is not a finite number, and the remedy; None where it always is."""
         if (k := first_not_finite(values)) is None:
             return None
+        if (message := self._message(name, k)) is not None:
+            return (
+                f"{message} has no {name.rpartition('.')[2]} ('{name}'), as "
+                f"{np.count_nonzero(~np.isfinite(values))} of {len(values)} in all; give resample "
+                "(Hz), which bridges it, or leave the signal out of the map"
+            )
         line = "" if self.first_line is None else f" (line {self.first_line + k})"
         return (
             f"column '{name}' is {values[k]} in row {k + 1} of {len(values)}{line}, "
             f"{np.count_nonzero(~np.isfinite(values))} in all; complete or cut out such rows, or "
             "leave the signal out of the map"
         )
+
+    def _message(self, name: str, row: int) -> str | None:
+        """Which message of a bag a row is; None where the table is of none."""
+        for clock, times in self.clocks.items():
+            prefix, _, field = clock.rpartition(".")
+            if field == "log_time" and name.startswith(f"{prefix}.") and row < len(times):
+                since = times[row] - times[0]
+                return f"message {row + 1} ({since / np.timedelta64(1, 's'):.9g} s)"
+        return None
 
 
 def require_columns(wanted: Iterable[str], there: Collection[str]) -> None:
@@ -93,7 +116,7 @@ def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
 def numbers(name: str, raw: NDArray) -> Array:
     """Column as (n,) floats, dates as seconds since the first; raises InputError for text."""
     array = np.asarray(raw)
-    if array.dtype.kind == "M":
+    if array.dtype.kind in "Mm":
         return np.asarray((array - array[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
     if array.ndim != 1 or array.dtype.kind not in "fiub":
         row = next((k for k, v in enumerate(array.flat, 1) if not isinstance(v, _REAL)), None)

@@ -9,10 +9,109 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
+from twin.importers.counters import and_more, clock_jumps, without_jumps
 from twin.importers.mapping import ImportMap
+from twin.importers.table import numbers
 from twin.logs.log import Array
 from twin.logs.topics import instant
 from twin.numbers import first_not_finite
+from twin.signals import between
+
+_HOUR, _DAY = 3600.0, 86400.0  # s
+_TIMERS = (2.0**32, 2.0**24, 2.0**16)  # counts of a timer before it begins again
+
+
+def times_of(name: str, raw: NDArray, unit: float) -> tuple[Array, tuple[str, ...]]:
+    """The times (n,) in s of a column as it is in its file, and sentences about what its clock did.
+
+    unit: one of its numbers, s. A clock that begins again, after 2^32 counts or a day, or is put by
+    an hour for summer time, goes on. Raises InputError where the column is not one of numbers.
+    """
+    times = unit * numbers(name, raw)
+    calendar = raw.dtype.kind in "Mm"
+    sizes = (_HOUR, _DAY, 0.5 * _DAY) if calendar else (*(n * unit for n in _TIMERS), _DAY)
+    if not np.isfinite(times).all() or (jumps := clock_jumps(times, sizes)) is None:
+        return times, ()
+    row = int(jumps.rows[0])
+    shown = [_shown(raw[k]) for k in (row - 2, row - 1)]
+    which = f"in row {row} ({shown[0]} is followed by {shown[1]}){and_more(len(jumps.rows))}"
+    if jumps.size == _HOUR:
+        what = f"is put by {_HOUR:g} s {which}: summer time; the hour is taken out"
+    elif calendar or jumps.size == _DAY:
+        what = f"begins again after {jumps.size / 3600.0:g} h {which}: the time goes on"
+    else:
+        bits = round(np.log2(jumps.size / unit))
+        what = f"begins again {which}: the roll-over of a counter of {bits} bits is taken out"
+    return without_jumps(times, jumps), (f"column '{name}': the clock {what}",)
+
+
+def _shown(value: np.generic) -> str:
+    """A time as its file has it, for a sentence."""
+    if value.dtype.kind == "M":
+        return str(value.astype("datetime64[us]").item().time())
+    if value.dtype.kind == "m":
+        return str(value.astype("timedelta64[us]").item())
+    return f"{value:.12g}"
+
+
+def repeated_rows(columns: Mapping[str, Array], time: Array) -> NDArray[np.intp]:
+    """The indices of rows that say once more what the row before them does, the time included."""
+    same = np.append(False, np.diff(time) == 0.0)
+    for column in columns.values():
+        same &= np.append(False, np.diff(column) == 0.0)
+    return np.flatnonzero(same)
+
+
+def simple_rate(rate: float, share: float = 0.01) -> float:
+    """The number with the fewest digits that differs from a rate by less than so large a share."""
+    plain = (float(f"{rate:.{digits}g}") for digits in range(1, 9))
+    return next((p for p in plain if abs(p / rate - 1.0) < share), rate)
+
+
+def rows_a_stamp(time: Array) -> float | None:
+    """How many rows have the same time, where each time is that of as many; None where not.
+
+    Of a recorder whose clock is coarser than its samples.
+    """
+    edges = np.flatnonzero(np.diff(time) != 0.0)
+    lengths = np.diff(edges)
+    few, even = 2, 0.1  # whole stretches; share by which they may differ, and one row
+    if len(lengths) < few or np.median(lengths) < 2.0 or (np.diff(time) < 0.0).any():
+        return None
+    mean = float(np.mean(lengths))
+    off = np.abs(lengths - mean).max() > max(1.0, even * mean)
+    if off:
+        return None
+    rate = len(lengths) * mean / float(time[edges[-1] + 1] - time[edges[0] + 1])
+    return simple_rate(rate, 1.0 / len(time))  # a row may be before or behind the edges
+
+
+def rate_of_rounded(time: Array) -> float | None:
+    """The rate in Hz of times (n,) in s that are even, but printed with few digits; else None.
+
+    None too where they have all digits that they need, so that nothing is rounded.
+    """
+    elapsed = time - time[0]
+    if not (np.diff(elapsed) >= 0.0).all() or elapsed[-1] <= 0.0:
+        return None
+    mean = float(elapsed[-1]) / (len(time) - 1)
+    for digits in range(7):
+        scaled = elapsed * 10.0**digits
+        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
+            break
+    else:
+        return None
+    digit = 10.0**-digits
+    finest = 0.01  # of a period, that a time may be off; coarser digits than these are rounded
+    longer = np.rint(between(elapsed, digit)) > np.floor(mean / digit + 1e-9)
+    few = 5  # steps of each of two lengths; one alone is a row that is lost or there twice
+    if digit < finest * mean or min(longer.sum(), (~longer).sum()) < few:
+        return None
+    for rate in dict.fromkeys((float(round(1.0 / mean)) or 1.0, 1.0 / mean)):
+        off = elapsed - np.arange(len(time)) / rate
+        if np.ptp(off) < 1.001 * digit and abs(1.0 / rate / mean - 1.0) * elapsed[-1] < digit:
+            return rate
+    return None
 
 
 def rate_of(time: Array) -> float:
@@ -30,6 +129,8 @@ def rate_of(time: Array) -> float:
     if abs(round(rate) / rate - 1.0) * len(steps) < jitter:
         rate = float(round(rate))
     off = np.abs(elapsed * rate - np.arange(len(time)))
+    if (off > jitter).any() and (rounded := rate_of_rounded(time)) is not None:
+        return rounded
     for fault, wrong in (
         ("does not increase", np.append(False, steps <= 0.0)),
         ("has a gap", np.append(False, steps > 1.5 * period)),
@@ -38,6 +139,11 @@ def rate_of(time: Array) -> float:
         if wrong.any():
             _require_no_hole(time)  # which a clock would not mend
             row = int(np.argmax(wrong))
+            if (coarse := rows_a_stamp(time)) is not None:
+                raise InputError(
+                    f"the time is the same in several rows each, {instant(time[row])} in row "
+                    f"{row + 1} and before; give sample_rate = {coarse:.6g} (Hz) in place of time"
+                )
             raise InputError(
                 f"the time {fault}: {instant(time[row - 1])} is followed by {instant(time[row])} "
                 f"in row {row + 1}, usual are {period:.6g} s a sample; give resample = "

@@ -28,6 +28,8 @@ _FOOTER_SIZE = RECORD_HEAD.size + 20
 IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 LARGEST_RATIO = 256  # of what any format of this house shrinks to
 
+_LFS = b"version https://git-lfs.github.com/spec/"
+
 T = TypeVar("T")
 
 
@@ -197,6 +199,15 @@ def record_at(data: bytes, offset: int) -> tuple[int, bytes, int]:
     return opcode, data[start : start + length], start + length
 
 
+def require_fetched(path: Path) -> None:
+    """Raise InputError where a file is the pointer that Git LFS leaves in the place of one."""
+    with open(path, "rb") as stream:
+        if stream.read(len(_LFS)) == _LFS:
+            raise InputError(
+                "is a pointer of Git LFS, not the recording itself; fetch that with: git lfs pull"
+            )
+
+
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Name the file in every failure of reading it, and make each an InputError."""
@@ -215,6 +226,7 @@ def reading(path: Path) -> Iterator[None]:
 def open_mcap(path: Path) -> Iterator[McapFile]:
     """Open ``path``; every failure is an InputError that names the file."""
     with reading(path), open(path, "rb") as stream:
+        require_fetched(path)
         yield McapFile(FileBytes(stream))
 
 

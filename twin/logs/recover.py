@@ -29,6 +29,7 @@ from mcap.records import Chunk, ChunkIndex
 
 from twin.errors import InputError, at
 from twin.files import is_same_file
+from twin.logs.bags import is_of_another, recover_bag
 from twin.logs.container import (
     MAGIC,
     RECORD_HEAD,
@@ -100,8 +101,14 @@ def recover_file(
     """Write what ``recover_log`` reads to files, a piece at a time: the longest series to ``out``.
 
     The others are beside it. Returns the recovery without its logs, and what each file holds.
-    Raises InputError as recover_log does, and where writing fails.
+    Of a bag of another program all messages that can be read are kept, in one file. Raises
+    InputError as recover_log does, and where writing fails.
     """
+    if is_of_another(path):
+        if is_same_file(out, path):
+            raise InputError(f"{path}: would be overwritten; give another name than {out}")
+        text, lost = recover_bag(path, out)
+        return Recovery(text, lost), {out: text}
     with _recovered(path, unproved) as (kept, recovery):
         names = (out.with_name(f"{out.stem}.part{n}{out.suffix}") for n in range(1, len(kept)))
         files = dict(zip((out, *names), kept, strict=True))

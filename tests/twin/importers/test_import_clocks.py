@@ -10,6 +10,7 @@ from import_cases import map_of, mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log
+from twin.importers.guess import guess_map
 from twin.logs import Log
 
 MAP = "resample = 1000.0\n" + map_of("q", "f", clock="t in s")
@@ -99,6 +100,43 @@ def test_every_shape_of_json(tmp_path: Path, shape) -> None:
         text = MAP.replace('"t"', '"run.t"').replace('"q"', '"run.q"').replace('"f"', '"run.f"')
     log = import_log(tmp_path / "a.json", mapping(tmp_path, text))
     np.testing.assert_allclose(log.axes["x"].force, columns["f"], atol=1e-9)
+
+
+RUNS = [recording(jitter=0.0, start=float(k)) for k in range(4)]
+ROWS = [np.column_stack([k * c for c in run.values()]).tolist() for k, run in enumerate(RUNS, 1)]
+
+
+@pytest.mark.parametrize(
+    ("content", "names"),
+    [
+        ({f"run{k}": rows for k, rows in enumerate(ROWS)}, "run0, run1, run2, run3"),
+        ([{"name": f"step {k} V", "rows": rows} for k, rows in enumerate(ROWS)], "data.step 0 V"),
+        ({"tests": [{"rows": rows} for rows in ROWS]}, r"tests\[1\], tests\[2\]"),
+        ({"columns": ["t", "q", "f"], "tests": {f"r{k}": rows for k, rows in enumerate(ROWS)}},
+         "tests.r0, tests.r1"),
+        ({f"r{k}": [dict(zip("tqf", row, strict=True)) for row in rows]
+          for k, rows in enumerate(ROWS)}, "r0, r1, r2, r3"),
+        ({f"r{k}": {n: (k + c).tolist() for n, c in run.items()} for k, run in enumerate(RUNS)},
+         "r0, r1, r2, r3"),
+    ],
+)  # fmt: skip
+def test_several_recordings_in_one_file_are_named(tmp_path: Path, content, names) -> None:
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=f"holds 4 recordings: {names}") as refused:
+        guess_map(tmp_path / "a.json")
+    assert "\n" not in str(refused.value)
+    column = str(refused.value).rpartition("such as '")[2].rstrip("'")
+    text = map_of(column, column)
+    assert len(import_log(tmp_path / "a.json", mapping(tmp_path, text))) == 3000
+
+
+def test_tables_of_axes_with_one_time_are_one_recording(tmp_path: Path) -> None:
+    axes = {a: {n: list(map(float, c)) for n, c in recording(0.0).items()} for a in ("x", "y")}
+    for k in range(3000):
+        axes["y"]["q"][k] *= 2.0
+        axes["y"]["f"][k] *= 3.0
+    (tmp_path / "a.json").write_text(json.dumps(axes))
+    assert "time = " in guess_map(tmp_path / "a.json").text
 
 
 @pytest.mark.parametrize(

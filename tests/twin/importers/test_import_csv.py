@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import MAP, mapping, table
+from import_cases import COUNT, MAP, mapping, table
 
 from twin.errors import InputError
-from twin.importers import import_log
+from twin.importers import import_log, told_of
 from twin.importers.guess import guess_map
 from twin.logs import Log
 
@@ -26,6 +26,13 @@ HEADER = "t,q,i,unused"
 ROWS = lines(table())
 PLAIN = "\n".join([HEADER, *ROWS])
 GERMAN = PLAIN.replace(",", ";").replace(".", ",")
+PROTOCOL = """Messprotokoll Achse Y;;;
+Datum;29.03.2026;;
+Parameter 1;1,25;;
+Parameter 2;2,50;;
+Bemerkung;"Lauf mit Last";;
+
+"""
 NUMBERED = MAP.replace('"q"', "2").replace('"i"', "3")
 
 
@@ -47,6 +54,17 @@ NUMBERED = MAP.replace('"q"', "2").replace('"i"', "3")
         ("# " + PLAIN, MAP),
         ("\ufeff" + PLAIN, MAP),
         (PLAIN.encode("utf-16"), MAP),
+        (PLAIN.encode("utf-16-le"), MAP),
+        (PLAIN.encode("utf-16-be"), MAP),
+        (b"\xfe\xff" + PLAIN.encode("utf-16-be"), MAP),
+        (PLAIN.replace("\n", "\r"), MAP),
+        (PROTOCOL.replace(";", ",") + PLAIN, MAP),
+        (PROTOCOL + GERMAN, MAP),
+        ("sep=;\n" + GERMAN, MAP),
+        ("\n".join([HEADER, "REAL,REAL,INT,REAL", "s,mm,mA,-", *ROWS]), MAP),
+        ("\n".join([HEADER, "----,----,----,----", *ROWS]), MAP),
+        (PLAIN + "\nend of recording\n", MAP),
+        ("\n".join([HEADER, *ROWS[:50], "# marker 1", *ROWS[50:]]), MAP),
         (PLAIN.replace("unused", "Zählung [µm]").encode("cp1252"), MAP),
         (PLAIN.replace("unused", "Zählung [µm]"), MAP),
         ("Recorder 3\nRate: 2000\n\n" + PLAIN, MAP),
@@ -73,6 +91,40 @@ def test_a_decimal_comma_is_found_above_a_rest_in_whole_numbers(tmp_path: Path) 
     axis = imported(tmp_path, "\n".join(["t;q;i", *moving, *resting])).axes["x"]
     expected = -1e-3 * (np.arange(300) / 7.0 + 2.0)
     np.testing.assert_allclose(axis.position[:300], expected, rtol=0, atol=1e-7)
+
+
+def test_thousands_may_be_grouped(tmp_path: Path) -> None:
+    rows = [f"{k};{1000 + k}.{k:03d},5;{k}".replace(str(1000 + k), "1", 1) for k in range(100)]
+    log = imported(tmp_path, "\n".join(["t;q;i", *rows]))
+    expected = -1e-3 * (1000.5 + np.arange(100) + 2.0)
+    np.testing.assert_allclose(log.axes["x"].position, expected, rtol=0, atol=1e-9)
+
+
+def test_a_last_line_that_was_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
+    log = imported(tmp_path, PLAIN[:-12])
+    assert len(log) == COUNT - 1
+    assert f"line {COUNT + 1} is cut off and left out" in told_of(log)[0]
+
+
+def test_a_header_in_the_middle_is_another_recording(tmp_path: Path) -> None:
+    text = "\n".join([HEADER, *ROWS, HEADER, *ROWS])
+    message = f"line {COUNT + 2} is the header again: two recordings in one file"
+    with pytest.raises(InputError, match=message):
+        imported(tmp_path, text)
+    with pytest.raises(InputError, match=message):
+        guess_map(tmp_path / "log.csv")
+
+
+def test_all_bad_cells_are_in_one_answer(tmp_path: Path) -> None:
+    rows = list(ROWS)
+    for k in range(20, 270, 5):
+        rows[k] = f"0.01,#N/A,{k},0"
+    with pytest.raises(InputError) as refused:
+        imported(tmp_path, "\n".join([HEADER, *rows]))
+    said = str(refused.value)
+    assert "50 cells are no numbers: line 22, column 'q': '#N/A' is not" in said
+    assert all(f"line {k + 2}, column 'q'" in said for k in range(20, 270, 5))
+    assert "\n" not in said
 
 
 def with_row(number: int, row: str) -> str:
@@ -123,9 +175,8 @@ def test_stamps_with_a_date_are_times(tmp_path: Path, day: str) -> None:
     assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "log.csv").text
 
 
-def test_other_stamps_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 2, column 't': .* nor a time such as .*rate"):
-        imported(tmp_path, stamped("01.05.2024"), CLOCKED)
-    text = guess_map(tmp_path / "log.csv").text
-    assert "sample_rate = 1000.0 # Hz, ASSUMED" in text
-    assert "# not used: t (no numbers)" in text
+def test_stamps_of_no_kind_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Path) -> None:
+    text = stamped("2024-05-01").replace("2024-05-01 12", "at noon 12")
+    with pytest.raises(InputError, match=r"'t' holds text, such as 'at noon .* sample_rate \(Hz\)"):
+        imported(tmp_path, text, CLOCKED)
+    assert "# sample_rate = ? # Hz: NOT KNOWN" in guess_map(tmp_path / "log.csv").text

@@ -16,7 +16,7 @@ from mcap.opcode import Opcode
 from mcap_bytes import of
 
 from twin.errors import InputError
-from twin.importers import import_log
+from twin.importers import import_log, told_of
 from twin.logs import Log
 from twin.logs.topics import instant
 
@@ -190,13 +190,19 @@ def test_json_in_mcap_and_a_damaged_one(tmp_path):
     assert_signals(imported(tmp_path, "a.mcap", text))
     intact = (tmp_path / "a.mcap").read_bytes()
     chunk = [r.start for r in of(intact, Opcode.CHUNK)][2]
-    # A record of an unknown kind is passed over, so that a chunk may be gone without a word.
-    for place, bit, why in ((chunk + 60, 1, "chunk at byte"), (chunk, 128, "messages where")):
+    # of a chunk that is damaged, or is no chunk any more
+    for place, bit, why in ((chunk + 60, 1, "chunk at byte"), (chunk, 128, "unreadable")):
         data = bytearray(intact)
         data[place] ^= bit
         (tmp_path / "a.mcap").write_bytes(data)
-        with pytest.raises(InputError, match=why):
-            imported(tmp_path, "a.mcap", text)
+        log = imported(tmp_path, "a.mcap", text)
+        assert COUNT / 2 < len(log) < COUNT
+        lost, counted, kept = told_of(log)
+        assert f"bytes {chunk} to " in lost
+        assert why in lost
+        assert counted.startswith(f"of {COUNT} messages ")
+        assert f"/drive: {len(log)} of " in kept
+        np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q[-len(log) :], atol=1e-12)
 
 
 def test_times_since_1970_are_shown_as_dates(tmp_path):

@@ -36,7 +36,7 @@ from scipy.io import loadmat, savemat
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
-from twin.importers.formats import content_bytes
+from twin.importers.dialects.mat import content_bytes
 from twin.importers.table import numbers, require_columns, split_columns
 from twin.logs.log import FIELDS
 
@@ -248,7 +248,7 @@ def test_what_a_file_states_itself_is_believed(tmp_path, name, write, text, rate
          r"log\.mat: does not state its sample rate"),
         ("log.xyz", changed(write_csv), MAP, r"ends in '\.xyz', known are \.csv"),
         ("log.xyz", changed(write_csv), 'format = "xlsx"\n' + MAP,
-         "format = 'xlsx'; allowed: csv, mat"),
+         "format = 'xlsx'; allowed: csv, halsampler"),
         ("none.csv", lambda path: None, MAP, r"none\.csv: cannot be read"),
     ],
 )  # fmt: skip

@@ -268,11 +268,6 @@ def turning(column, values):
 @pytest.mark.parametrize(
     ("columns", "entries"),
     [
-        # the number of a row is no time
-        ({"Sample": INDEX, **SLIDE},
-         {"sample_rate": "1000.0 # Hz, ASSUMED: Sample counts the rows", **PLAIN}),
-        ({"t": INDEX, **SLIDE},
-         {"sample_rate": "1000.0 # Hz, ASSUMED: t counts the rows", **PLAIN}),
         ({"t_ms": INDEX, **SLIDE},
          {"time": '{column = "t_ms", unit = "ms"} # rises by 1 ms: its name states the', **PLAIN}),
         # the unit and the data decide against a name
@@ -300,6 +295,17 @@ def test_an_entry_has_its_column_and_unit_with_the_reason(tmp_path, columns, ent
         assert line in found[entry]
 
 
+@pytest.mark.parametrize("name", ["Sample", "t"])
+def test_the_number_of_a_row_is_no_time_and_no_rate_is_made_up(tmp_path, name):
+    write_csv(tmp_path / "a.csv", {name: INDEX, **SLIDE})
+    found = guess_map(tmp_path / "a.csv")
+    (what,) = found.missing
+    assert what == f"'{name}' counts the rows; give sample_rate (Hz)"
+    assert f"# sample_rate = ? # Hz: NOT KNOWN, '{name}' counts the rows" in found.text
+    with pytest.raises(InputError, match="does not state its sample rate"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, found.text))
+
+
 def test_what_is_called_a_velocity_and_is_none_says_so(tmp_path):
     columns = {"time_s": T, "q_rad": Q, "qd": NOISE, "force_N": F}
     write_csv(tmp_path / "a.csv", columns)
@@ -312,13 +318,14 @@ def test_counts_ask_for_their_scale_and_the_map_says_so_until_it_is_given(tmp_pa
     write_csv(tmp_path / "a.csv", columns)
     found = guess_map(tmp_path / "a.csv")
     assert found.missing == (
-        "axis x: the scale of its position is not known: rad or m for one of enc_counts",
+        "axis x: the scale of its position is not known: counts_per_turn of the encoder of "
+        "enc_counts, or counts_per_metre where the axis travels",
         "axis x: the scale of its force is not known: N for one of u [V]",
     )
     assert "# not used: speed [counts/s]: counted: the position tells it too" in found.text
-    with pytest.raises(InputError, match="unit 'counts' needs a scale"):
+    with pytest.raises(InputError, match="unit 'counts' needs counts_per_turn or"):
         mapping(tmp_path, found.text)
-    text = found.text.replace('unit = "counts"', 'unit = "counts", scale = 1e-6')
+    text = found.text.replace('unit = "counts"', 'unit = "counts", counts_per_metre = 1e6')
     text = text.replace('unit = "V"', 'unit = "V", scale = 2.0')
     log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-6)

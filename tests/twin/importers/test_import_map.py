@@ -9,7 +9,7 @@ from import_cases import mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
-from twin.importers.mapping import find_unit
+from twin.importers.units import find_unit
 
 GOOD = """
 sample_rate = 1000.0

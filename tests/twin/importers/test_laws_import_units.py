@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from twin.errors import InputError
-from twin.importers.mapping import find_unit
 from twin.importers.time_base import rate_of
+from twin.importers.units import find_unit
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 METRES = {"m": 1.0, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 25.4e-3}

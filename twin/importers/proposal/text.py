@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from twin.importers.mapping import is_unit
 from twin.importers.proposal.courses import Column
 from twin.importers.proposal.lexicon import Quantity
 from twin.importers.proposal.signals import Axis, File, Signal
@@ -16,6 +15,7 @@ from twin.importers.proposal.units import (
     SURE,
     customary,
     drive_unit,
+    is_counted,
     is_raw,
     moves_straight,
     near,
@@ -24,18 +24,21 @@ from twin.importers.proposal.units import (
     turns,
     unit_as_large,
 )
+from twin.importers.units import is_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 ORDER = ("position", "velocity", "setpoint_position", "setpoint_velocity", "force", "current")
 CONSTANT = "force_constant"
 SCALE, UNIT = "scale", "unit"
+TURN, METRE = "counts_per_turn", "counts_per_metre"
+PER_ONE = (SCALE, TURN, METRE)  # entries without which a raw column has no size
 Answers = Mapping[tuple[str, str, str], str]
 """What the user knows: (axis, field, scale or unit) -> the entry."""
 
 
 @dataclass(frozen=True)
 class Need:
-    """What the file does not tell, of an axis' field. entry: scale, unit or force_constant.
+    """What the file does not tell, of an axis' field. entry: in the map, such as scale or unit.
 
     what: the quantity that is asked for. assumed: what is taken if nobody says otherwise, None
     where nothing can be.
@@ -55,19 +58,23 @@ class Need:
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the map: a signal in its unit. needs: what is not known of it."""
+    """A line of the map: a signal in its unit. needs: what is not known of it.
+
+    size: of one of it, the entry and its value, where it is known.
+    """
 
     signal: Signal
     unit: str
     remarks: tuple[str, ...] = ()
     needs: tuple[Need, ...] = ()
-    scale: str | None = None
+    size: tuple[str, str] | None = None
 
     def line(self, column: Column) -> str:
         """As it stands in the map."""
         values = {"column": _quoted(self.signal.column), "unit": _quoted(self.unit)}
-        if self.scale is not None:
-            values["scale"] = self.scale
+        if self.size is not None:
+            entry, value = self.size
+            values[entry] = value
         if self.signal.sign < 0:
             values["sign"] = "-1"
         table = ", ".join(f"{key} = {value}" for key, value in values.items())
@@ -85,8 +92,9 @@ class Entry:
                 continue
             left = tuple(n for n in entry.needs if n is not need)
             entry = replace(entry, needs=left, remarks=(f"{need.entry} as given",))
-            unit = need.entry == UNIT
-            entry = replace(entry, unit=given) if unit else replace(entry, scale=given)
+            states_unit = need.entry == UNIT
+            size = (need.entry, given)
+            entry = replace(entry, unit=given) if states_unit else replace(entry, size=size)
         return entry
 
 
@@ -194,9 +202,14 @@ def _assumed(axis: Axis, signal: Signal, unit: str) -> Entry:
 
 def _without_scale(axis: Axis, signal: Signal, unit: str, si: str, how: str = "") -> Entry:
     """An entry that the map cannot be used with until somebody gives its scale."""
-    what = f"{si} for one of {signal.column}"
-    need = Need(axis.name, signal.field, SCALE, f"{what}{f' ({how})' if how else ''}")
-    remark = f"scale NOT KNOWN: {si} for one{f', {how}' if how else ''}"
+    what, entry, hint = f"{si} for one of {signal.column}", SCALE, f", {how}" if how else ""
+    remark = f"scale NOT KNOWN: {si} for one{hint}"
+    if is_counted(unit) and signal.field not in ("force", "current"):
+        entry = METRE if si.startswith("m") else TURN
+        either = "" if " or " not in si else f", or {METRE} where the axis travels"
+        what = f"{entry} of the encoder of {signal.column}{either}"
+        remark = f"{entry} NOT KNOWN{either}{hint}"
+    need = Need(axis.name, signal.field, entry, f"{what}{f' ({how})' if how else ''}")
     return Entry(signal, unit, (remark,), (need,))
 
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from twin.importers.mapping import find_unit, is_unit
 from twin.importers.proposal.courses import Column
 from twin.importers.proposal.lexicon import CUSTOMARY, RAW, TURNING, Quantity
 from twin.importers.proposal.names import Name, words_of
 from twin.importers.proposal.signals import Axis, File, Signal
+from twin.importers.units import COUNTS, find_unit, is_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 LENGTHS = ("m", "mm", "um")
@@ -26,6 +26,11 @@ SAME = 0.99  # likeness, from which a size tells a unit: a spring's force goes a
 def is_raw(unit: str | None) -> bool:
     """Whether a unit needs a scale."""
     return (unit or "").partition("/")[0] in RAW
+
+
+def is_counted(unit: str) -> bool:
+    """Whether a unit is that of a counter."""
+    return unit.partition("/")[0] in COUNTS
 
 
 def turns(axis: Axis) -> bool:

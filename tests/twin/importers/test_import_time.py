@@ -1,0 +1,226 @@
+"""The time base of a file: read in any locale, told where a clock jumps, else asked for."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from import_cases import map_of, mapping, write_csv
+
+from twin.errors import InputError
+from twin.importers import import_log, told_of
+from twin.importers.guess import guess_map
+from twin.importers.stated_rate import stated_rate
+from twin.logs import Log
+
+COUNT, STEP = 600, timedelta(milliseconds=4)
+T = 4e-3 * np.arange(COUNT)
+Q, F = 30.0 * np.sin(9.0 * T), 5.0 * np.cos(9.0 * T)
+NOON = datetime(2026, 3, 28, 11, 59, 59)
+
+
+def rows(stamp, start: datetime = NOON, head: str = "t,q,f") -> str:
+    """A table whose rows begin as ``stamp`` writes their times."""
+    body = (f"{stamp(start + k * STEP)},{Q[k]:.9g},{F[k]:.9g}" for k in range(COUNT))
+    return "\n".join([head, *body]) + "\n"
+
+
+def imported(folder: Path, text: str, clock: str = "t in s") -> Log:
+    (folder / "a.csv").write_text(text, encoding="utf-8")
+    return import_log(folder / "a.csv", mapping(folder, map_of("q", "f", clock=clock)))
+
+
+def milli(time: datetime) -> str:
+    return f"{time.microsecond // 1000:03d}"
+
+
+def twelve(time: datetime, between: str = " ") -> str:
+    return f"{time:%I:%M:%S}.{milli(time)}{between}{time:%p}"
+
+
+STAMPS = {
+    "german": lambda t: f"{t:%d.%m.%Y %H:%M:%S}.{milli(t)}",
+    "american": lambda t: f"{t:%m/%d/%Y} {twelve(t)}",
+    "british": lambda t: f"{t:%d/%m/%Y %H:%M:%S}.{milli(t)}",
+    "with letters": lambda t: f"{t:%d-%b-%Y %H:%M:%S}.{milli(t)}",
+    "iso": lambda t: t.isoformat(timespec="milliseconds"),
+    "iso with a zone": lambda t: t.isoformat(timespec="milliseconds") + "Z",
+    "colon before ms": lambda t: f"{t:%Y-%m-%d %H:%M:%S}:{milli(t)}",
+    "small letters": lambda t: f"{t:%m/%d/%Y} {twelve(t, '').lower()}",
+}
+
+
+@pytest.mark.parametrize("way", STAMPS)
+@pytest.mark.parametrize("start", [NOON, datetime(2026, 3, 31, 23, 59, 59)], ids=["noon", "month"])
+def test_stamps_of_any_locale_over_noon_and_over_the_end_of_a_month(tmp_path, way, start):
+    log = imported(tmp_path, rows(STAMPS[way], start))
+    assert (log.sample_rate, len(log)) == (250.0, COUNT)
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, atol=1e-9)
+    began = np.datetime64(start, "ns").astype(np.int64)
+    assert int(log.metadata["start_time_unix_ns"]) == began
+    assert not told_of(log)
+    assert 'time = {column = "t", unit = "s"} # rises by 0.004 s' in proposed(tmp_path)
+
+
+def proposed(folder: Path) -> str:
+    return guess_map(folder / "a.csv").text
+
+
+def test_a_zone_is_taken_off_and_a_date_that_may_be_two_is_no_date(tmp_path):
+    log = imported(tmp_path, rows(lambda t: t.isoformat(timespec="milliseconds") + "+02:00"))
+    began = np.datetime64(NOON - timedelta(hours=2), "ns").astype(np.int64)
+    assert int(log.metadata["start_time_unix_ns"]) == began
+    april = datetime(2026, 4, 3, 10)  # or the 4th of March
+    log = imported(tmp_path, rows(STAMPS["british"], april))
+    assert log.sample_rate == 250.0
+    assert "start_time_unix_ns" not in log.metadata
+
+
+@pytest.mark.parametrize("locale", ["german", "american"])
+def test_date_and_time_in_two_columns(tmp_path, locale):
+    start = datetime(2026, 3, 31, 23, 59, 59)
+    day, time = ("%d.%m.%Y", lambda t: f"{t:%H:%M:%S}.{milli(t)}")
+    if locale == "american":
+        day, time = "%m/%d/%Y", twelve
+    text = rows(lambda t: f"{t.strftime(day)},{time(t)}", start, "Datum,Zeit,q,f")
+    log = imported(tmp_path, text, "Zeit in s")
+    assert log.sample_rate == 250.0
+    assert int(log.metadata["start_time_unix_ns"]) == np.datetime64(start, "ns").astype(np.int64)
+    assert 'time = {column = "Zeit", unit = "s"}' in proposed(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "start", "said"),
+    [
+        (lambda t: f"{t:%H:%M:%S}.{milli(t)}", datetime(2026, 3, 31, 23, 59, 59),
+         "begins again after 24 h in row 251 .23:59:59.996000 is followed by 0:00:00"),
+        (lambda t: f"{t:%I:%M:%S}.{milli(t)}", datetime(2026, 3, 31, 12, 59, 59),
+         "begins again after 12 h"),
+        (lambda t: STAMPS["german"](t + timedelta(hours=t >= datetime(2026, 3, 29, 2))),
+         datetime(2026, 3, 29, 1, 59, 59),
+         r"put by 3600 s in row 251 \(01:59:59.996000 is followed by 03:00:00\): summer time"),
+        (lambda t: STAMPS["german"](t - timedelta(hours=t >= datetime(2026, 10, 25, 3))),
+         datetime(2026, 10, 25, 2, 59, 59), "put by 3600 s in row 251"),
+        (lambda t: f"{(2**32 - 10**6 + round((t - NOON) / timedelta(microseconds=1))) % 2**32}",
+         NOON, "begins again in row 251 .4294963296 is followed by 0.: the roll-over .* 32 bits"),
+        (lambda t: f"{(65_000 + round((t - NOON) / timedelta(milliseconds=1))) % 2**16}",
+         NOON, "roll-over of a counter of 16 bits"),
+    ],
+)  # fmt: skip
+def test_a_clock_that_jumps_goes_on_and_that_is_told(tmp_path, stamp, start, said):
+    text = rows(stamp, start)
+    unit = "us" if "32 bits" in said else "ms" if "16 bits" in said else "s"
+    log = imported(tmp_path, text, f"t in {unit}")
+    assert (log.sample_rate, len(log)) == (250.0, COUNT)
+    (told,) = told_of(log)
+    with pytest.raises(AssertionError, match=said):
+        raise AssertionError(told)
+    if "bits" not in said:
+        assert told in proposed(tmp_path)
+
+
+def test_one_row_twice_is_left_out_and_told(tmp_path):
+    lines = rows(STAMPS["german"]).splitlines()
+    log = imported(tmp_path, "\n".join([*lines[:300], lines[299], *lines[300:]]))
+    assert (log.sample_rate, len(log)) == (250.0, COUNT)
+    assert told_of(log) == ["row 300: what the row before says, once more; left out"]
+
+
+def test_a_clock_coarser_than_the_samples_gives_the_rate_by_rows_a_stamp(tmp_path):
+    text = rows(lambda t: f"{t:%d.%m.%Y %H:%M:%S}.{milli(t)[0]}")
+    with pytest.raises(InputError, match="give sample_rate = 250 "):
+        imported(tmp_path, text)
+    assert "sample_rate = 250 # Hz: each time of t is that of" in proposed(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["SAMPLE PERIOD,4,ms", "Sample Period: 0.004", "Abtastrate;0,25 kHz", "# fs = 250 Hz",
+     "Abtastzeit [ms];4", "sampling frequency: 250"],
+)  # fmt: skip
+def test_a_rate_that_the_head_states_is_read(tmp_path, line):
+    text = f"Recorder 7\n{line}\n\nq,f\n" + "\n".join(
+        f"{q:.9g},{f:.9g}" for q, f in zip(Q, F, strict=True)
+    )
+    assert imported(tmp_path, text, "").sample_rate == pytest.approx(250.0)
+    assert "sample_rate = 250 # Hz: the file states" in proposed(tmp_path)
+    other = imported(tmp_path, text, "sample_rate = 500.0")
+    assert "the file states 250 Hz" in told_of(other)[0]
+
+
+def test_words_that_state_no_rate():
+    for text in ("Baud rate: 115200", "Frequency: 50 Hz", "Feed rate 100 mm/s", "Messzeit;10;s",
+                 "recording time: 12:30:00", "Record Length,2500"):  # fmt: skip
+        assert stated_rate([text]) is None
+    unknown = stated_rate(["SAMPLE PERIOD 2"])
+    assert unknown is not None
+    assert unknown.rate is None
+    assert stated_rate(["Fs: 1,000"]).rate == 1000.0
+
+
+def test_a_rate_among_the_values_of_a_file_is_read(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps({"fs": 250.0, "q": Q.tolist(), "f": F.tolist()}))
+    assert (
+        "sample_rate = 250 # Hz: the file states 'fs = 250'" in guess_map(tmp_path / "a.json").text
+    )
+
+
+def test_a_counter_with_gaps_asks_for_its_step_and_no_number_is_in_the_map(tmp_path):
+    number = np.delete(np.arange(COUNT + 2.0), [200, 201])
+    write_csv(tmp_path / "a.csv", {"n": number, "pos_mm": Q, "force_N": F})
+    found = guess_map(tmp_path / "a.csv")
+    assert found.missing[0].startswith(
+        "'n' counts the samples and lacks 2 of them, the first 200 to 201; give step"
+    )
+    assert not [line for line in found.text.splitlines() if line.startswith(("time", "sample"))]
+    text = map_of("pos_mm", "force_N", clock="n in s").replace('unit = "s"', "step = 0.004", 1)
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, "resample = 250.0\n" + text))
+    assert len(log) == COUNT + 2
+    with pytest.raises(InputError, match="give unit, such as"):
+        mapping(tmp_path, text.replace("step", 'unit = "s", step'))
+
+
+def test_times_are_found_by_their_unit_alone_with_repeats(tmp_path):
+    late = np.insert(T, 100, T[99])
+    columns = {"pos_mm": Q, "force_N": F}
+    columns = {n: np.insert(c, 100, c[99] + 1e-6) for n, c in columns.items()}
+    for name in ("micros", "t_us", "us"):
+        write_csv(tmp_path / "a.csv", {name: 1e6 * late, **columns})
+        assert f'time = {{column = "{name}", unit = "us"}}' in proposed(tmp_path)
+
+
+@pytest.mark.parametrize("rate", [400.0, 800.0, 3200.0])
+def test_times_that_are_printed_with_few_digits_are_even(tmp_path, rate):
+    printed = np.rint(1e3 * np.arange(COUNT) / rate)
+    write_csv(tmp_path / "a.csv", {"ms": printed, "pos_mm": Q, "force_N": F})
+    text = map_of("pos_mm", "force_N", clock="ms in ms")
+    if rate < 1000.0:
+        log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+        assert (log.sample_rate, len(log)) == (rate, COUNT)
+    assert f"sample_rate = {rate:g} # Hz" in proposed(tmp_path)
+
+
+def test_a_motion_that_rises_is_no_time(tmp_path):
+    rising = 30.0 * np.sin(0.5 * T)
+    rng = np.random.default_rng(2)
+    write_csv(tmp_path / "a.csv", {"q": rising, "f": F})
+    assert guess_map(tmp_path / "a.csv").missing[0].startswith("no column rises as times do")
+    uneven = np.cumsum(4.0 + rng.uniform(-0.4, 0.4, COUNT))
+    write_csv(tmp_path / "a.csv", {"a": uneven, "q": rising, "f": F})
+    assert 'time = {column = "a", unit = "ms"}' in proposed(tmp_path)
+
+
+def test_stamps_as_text_in_other_formats(tmp_path):
+    stamps = [STAMPS["iso"](NOON + k * STEP) for k in range(COUNT)]
+    columns = {"t": stamps, "q": Q.tolist(), "f": F.tolist()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    for content in (columns, rows):
+        (tmp_path / "a.json").write_text(json.dumps(content))
+        text = map_of("q", "f", clock="t in s")
+        log = import_log(tmp_path / "a.json", mapping(tmp_path, text))
+        assert log.sample_rate == 250.0
+        assert "start_time_unix_ns" in log.metadata
+        assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "a.json").text

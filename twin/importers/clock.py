@@ -1,0 +1,302 @@
+"""What a file says of its time base, as lines of a proposed map: found, or asked for.
+
+A column of times tells it best, then what the file states in words. A counter of the samples tells
+no time: how long one is must be given, and no number stands in its place.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.errors import InputError
+from twin.importers.counters import find_wraps, unwrapped
+from twin.importers.stated_rate import StatedRate, stated_rate
+from twin.importers.table import SignalTable
+from twin.importers.time_base import (
+    rate_of_rounded,
+    repeated_rows,
+    rows_a_stamp,
+    simple_rate,
+    times_of,
+)
+from twin.importers.units import find_unit, is_unit
+from twin.logs.log import Array
+
+_WORDS = {
+    "time", "timestamp", "timestamps", "stamp", "t", "ts", "zeit", "zeitstempel", "uhrzeit",
+    "clock", "temps", "heure", "tiempo", "elapsed", "epoch", "uptime", "millis", "micros", "nanos",
+    "ms", "us", "ns", "sec", "secs", "seconds", "datetime", "时间", "时间戳", "時間", "時刻",
+}  # fmt: skip
+_COUNTING = {
+    "n", "k", "sample", "samples", "index", "idx", "row", "count", "cnt", "counter", "cycle",
+    "cycles", "tick", "ticks", "seq", "sequence", "frame", "nr", "no", "number", "序号",
+}  # fmt: skip
+_UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": "us", "ns": "ns",
+               "usec": "us", "msec": "ms", "nsec": "ns", "sec": "s", "secs": "s", "seconds": "s",
+               "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
+               "s": "s"}  # fmt: skip
+_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The time base of a file.
+
+    lines: of a map. step: s a sample, NOMINAL where it is not known. used: the columns that tell
+    times or count, and are no signals. missing: what must be given, a sentence each.
+    """
+
+    lines: tuple[str, ...]
+    step: float
+    used: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Times:
+    """A column that may be that of the times, in s (n,), with its unit and what tells that."""
+
+    name: str
+    seconds: Array
+    unit: str
+    reason: str
+    said: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """The usual step, s."""
+        steps = np.diff(self.seconds)
+        return float(np.median(steps[steps > 0.0]))
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether many rows have the time of the row before."""
+        return float((np.diff(self.seconds) == 0.0).mean()) > 0.1
+
+    @property
+    def duration(self) -> float:
+        """From its first to its last time, s."""
+        return float(self.seconds[-1] - self.seconds[0])
+
+    @property
+    def entry(self) -> str:
+        """Its entry in a map."""
+        column = json.dumps(self.name, ensure_ascii=False)
+        return f'{{column = {column}, unit = "{self.unit}"}}'
+
+
+def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
+    """The time base of a table; columns: those of numbers (n,), all as long."""
+    if table.sample_rate is not None:
+        rate = table.sample_rate
+        return Clock((f"# the file states its sample rate: {rate:g} Hz",), 1.0 / rate,
+                     tuple(n for n in columns if is_time(n)))  # fmt: skip
+    counters = [name for name, column in columns.items() if counts(name, column)]
+    called, even = _candidates(table, columns, counters)
+    stated = stated_rate([*table.notes, *_scalars(table)])
+    found = called or ([] if stated is not None and stated.rate else even[:1])
+    dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
+    used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
+    if found:
+        return _of_times(found, columns, stated, used)
+    if stated is not None and stated.rate is not None:
+        line = f"sample_rate = {stated.rate:.9g} # Hz: the file states {stated.text!r}"
+        return Clock((line,), 1.0 / stated.rate, used)
+    return _asked(columns, counters, stated, used)
+
+
+def is_time(name: str) -> bool:
+    """Whether a column is called as one of times."""
+    return bool(set(_words(name)) & _WORDS) or _unit_of(name) is not None
+
+
+def _words(name: str) -> list[str]:
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
+    return re.findall(r"[^\W\d_]+", spaced.lower())
+
+
+def _unit_of(name: str) -> str | None:
+    """The unit of time that a name ends with, or is."""
+    bracketed = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$", name)
+    if bracketed:
+        return bracketed[1] if is_unit(bracketed[1], "s") else None
+    words = _words(name)
+    last = words[-1] if words else ""
+    if last in ("s", "us", "ms", "ns") and len(words) > 1 and not set(words[:-1]) & _WORDS:
+        return None  # pos_ms is no time, as a_s is none
+    return _UNIT_NAMES.get(last)
+
+
+def counts(name: str, column: Array) -> bool:
+    """Whether a column (n,) counts the samples, with gaps or begun again, and tells no time."""
+    if _unit_of(name) is not None or (column != np.rint(column)).any() or len(column) < 3:
+        return False
+    steps = np.diff(_continued(column))
+    usual = float(np.median(steps))
+    if usual <= 0.0 or (steps <= 0.0).mean() > 0.01 or (steps != usual).mean() > 0.1:
+        return False
+    return usual == 1.0 or bool(set(_words(name)) & _COUNTING)
+
+
+def _continued(column: Array) -> Array:
+    """A counter without its beginning again."""
+    wraps = find_wraps(column)
+    return column if wraps is None else unwrapped(column, wraps.size)
+
+
+def _candidates(
+    table: SignalTable, columns: Mapping[str, Array], counters: Sequence[str]
+) -> tuple[list[_Times], list[_Times]]:
+    """The columns that are called as times, and others that rise as evenly as these."""
+    even, called = [], []
+    for name, column in columns.items():
+        raw = np.asarray(table.columns[name])
+        if name in counters or raw.dtype == np.dtype("datetime64[D]"):  # a date is in its times
+            continue
+        calendar = raw.dtype.kind in "Mm"
+        unit, reason = _unit(name, column, calendar)
+        try:
+            times, said = times_of(name, column if not calendar else raw, find_unit(unit, "s").size)
+        except InputError:
+            continue
+        steps = np.diff(times)
+        if not (steps > 0.0).any() or ((steps < 0.0).mean() > 0.01 and not calendar):
+            continue
+        one = _Times(name, times, unit, reason, said)
+        rising, level = float((steps > 0.0).mean()), float((steps == 0.0).mean())
+        if calendar or (is_time(name) and (rising > 0.5 or rows_a_stamp(times))):
+            called.append(one)
+        elif rising > 0.9 and level == 0.0 and _is_even(steps):
+            even.append(one)
+    called.sort(key=lambda one: one.is_coarse)
+    return called, even
+
+
+def _is_even(steps: Array) -> bool:
+    """Whether steps (n,) are those of a clock: all alike, or off by chance and not as a motion."""
+    spread, usual = float(np.ptp(steps)), float(np.median(steps))
+    chance = 0.05  # of the spread, by which steps that are off by chance differ from the next one
+    exact = spread < 0.01 * usual
+    return exact or (
+        spread < 0.5 * usual and float(np.mean(np.abs(np.diff(steps)))) > chance * spread
+    )
+
+
+def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
+    """The unit of a column of times, and why."""
+    if calendar:
+        return "s", "dates and times" if len(column) else ""
+    if (unit := _unit_of(name)) is not None:
+        return unit, "its name states the unit"
+    steps = np.diff(_continued(column))
+    rising = steps[steps > 0.0]
+    step = float(np.median(rising)) if len(rising) else 1.0
+    slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
+    fits = [u for u, size in _SIZES.items() if slowest <= size / step <= fastest]
+    unit = fits[0] if fits else "s"
+    told = f"that is {_SIZES[unit] / step:.6g} Hz"
+    return unit, told if _SIZES[unit] == 1.0 else f"unit ASSUMED: {told}"
+
+
+def _of_times(
+    found: Sequence[_Times], columns: Mapping[str, Array], stated: StatedRate | None,
+    used: tuple[str, ...],
+) -> Clock:  # fmt: skip
+    """The time base by the best of several columns of times."""
+    time, why = _best(found)
+    lines = []
+    coarse = rows_a_stamp(time.seconds)
+    if coarse is not None:
+        rows = f"each time of {time.name} is that of {coarse * time.step:.4g} rows"
+        lines.append(f"sample_rate = {coarse:.6g} # Hz: {rows}")
+        return Clock(tuple(lines), 1.0 / coarse, used)
+    if (rounded := rate_of_rounded(time.seconds)) is not None:
+        line = f"sample_rate = {rounded:.9g} # Hz: so many rows a second by {time.name}, which is"
+        return Clock((f"{line} rounded",), 1.0 / rounded, used)
+    step = time.step / find_unit(time.unit, "s").size
+    lines.append(f"time = {time.entry} # rises by {step:.6g} {time.unit}: {time.reason}{why}")
+    lines += [f"# {text}" for text in time.said]
+    lines += [f"# or: time = {other.entry} # rises by {other.step:.6g} s"
+              for other in found if other is not time and other.duration > 0.0]  # fmt: skip
+    steps = np.diff(time.seconds)
+    again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
+    off = np.abs(np.delete(steps, again - 1) - time.step)
+    if len(off) and off.max() > 0.01 * time.step:  # what is less even needs resample
+        rate = simple_rate(1.0 / time.step)
+        spread = f"{steps.min() / time.step * step:.4g} to {steps.max() / time.step * step:.4g}"
+        lines.append(
+            f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}"
+        )
+    if stated and stated.rate and abs(stated.rate * time.step - 1.0) > 0.02:
+        lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
+    return Clock(tuple(lines), time.step, used)
+
+
+def _best(found: Sequence[_Times]) -> tuple[_Times, str]:
+    """The column of times to take, and why where another is wrong.
+
+    Of a message the stamp is that of its measurement, and its log time when it was recorded: where
+    the stamps stand still, or take another time in all, the recorder is right.
+    """
+    first = found[0]
+    recorded = [f for f in found if f.name.endswith(".log_time")]
+    stamps = [f for f in found if f not in recorded]
+    if not recorded or not stamps:
+        return first, ""
+    clock, off = recorded[0], 0.02  # of the time in all, by which two clocks do not differ
+    for stamp in stamps:
+        rising = float((np.diff(stamp.seconds) > 0.0).mean())
+        if rising > 0.9 and abs(stamp.duration / max(clock.duration, 1e-9) - 1.0) < off:
+            return stamp, ""
+    what = f"take {stamps[0].duration:.4g} s" if stamps[0].duration > 0.0 else "stand still"
+    return clock, f"; the times of {stamps[0].name} {what}, these {clock.duration:.4g} s"
+
+
+def _scalars(table: SignalTable) -> Iterator[str]:
+    """The values beside the columns of a file, as text."""
+    for name, column in table.columns.items():
+        if len(column) == 1 and np.asarray(column).dtype.kind in "fiu":
+            yield f"{re.split(r'[./]', name)[-1]} = {float(column[0]):.12g}"
+
+
+def _asked(
+    columns: Mapping[str, Array], counters: Sequence[str], stated: StatedRate | None,
+    used: tuple[str, ...],
+) -> Clock:  # fmt: skip
+    """The lines that ask for a time base."""
+    unit = "" if stated is None else f"; the file states {stated.text!r} without a unit"
+    lines = []
+    for name in counters[:1]:
+        steps = np.diff(_continued(columns[name]))
+        lost = int(np.sum(np.maximum(steps / np.median(steps) - 1.0, 0.0)))
+        gap = f" and lacks {lost} of them, the first {_lost(columns[name])}" if lost else ""
+        many = "" if np.median(steps) == 1.0 else f", {np.median(steps):g} at a time"
+        why = f"'{name}' counts the {'samples' if lost else 'rows'}{many}{gap}"
+        if lost or many:
+            column = json.dumps(name, ensure_ascii=False)
+            lines = [
+                f"# time = {{column = {column}, step = ?}} # s a count: NOT KNOWN, {why}{unit}"
+            ]
+            if lost:
+                lines.append("# resample = ? # Hz: what is lost is bridged by straight lines")
+            said = f"{why}{unit}; give step (s a count): time = {{column = {column}, step = ...}}"
+            return Clock(tuple(lines), NOMINAL, used, (said,))
+        break
+    else:
+        why = "no column rises as times do"
+    line = f"# sample_rate = ? # Hz: NOT KNOWN, {why}{unit}"
+    return Clock((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
+
+
+def _lost(column: Array) -> str:
+    """The first numbers that a counter lacks."""
+    steps = np.diff(column)
+    k = int(np.argmax(steps > np.median(steps)))
+    first, last = column[k] + 1, column[k + 1] - 1
+    return f"{first:g}" if first == last else f"{first:g} to {last:g}"

@@ -1,0 +1,167 @@
+"""Tables of text as programs write them: names, units and first row are found in the file.
+
+Lines above the header are ignored, but for a rate that they state. A unit in a line below it is
+part of the name, as in "Position [mm]"; "Position" finds the column as well. Where there is no
+header the columns are called "1", "2", ...
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from twin.errors import InputError
+from twin.importers.dialects import Dialect
+from twin.importers.mapping import ImportMap
+from twin.importers.stamps import is_date, is_stamp
+from twin.importers.table import SignalTable, parsing
+from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
+from twin.importers.units import is_unit, is_usual_unit, raw_unit
+from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
+
+_UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
+_SOME = 40  # rows by which the kinds of the columns are told
+
+Rows = Sequence[Sequence[str]]
+
+
+def read(path: Path, mapping: ImportMap) -> SignalTable:
+    """Columns of a text table; raises InputError."""
+    with parsing("a text table"):
+        return read_table(path, mapping, find_layout(Head.of(path), mapping))
+
+
+def find_layout(head: Head, stated: ImportMap) -> Layout:
+    """The layout of a table of which nothing is known; raises InputError."""
+    style = head.style(stated)
+    rows = [style.cells(line) for line in head.lines]
+    if style.delimiter is None:  # names may be of several words
+        lines = (re.sub(r"^\s*#", "", line).strip() for line in head.lines)
+        spaced = [re.split(r"\s{2,}|\t", line) for line in lines]
+    else:
+        spaced = rows
+    width = _width(rows)
+    counting = _counting(rows, width, style)
+    skip = _first_row(rows, counting, style, stated.header_line)
+    header = _header(rows, spaced, skip, stated.header_line)
+    if header is not None:  # a row with a bad cell is one, too
+        between = range(header + 1, skip)
+        skip = next((k for k in between if _good(rows[k], counting, style)), skip)
+    some = rows[skip :: max(1, (len(rows) - skip) // _SOME)]
+    if header is None:
+        names: tuple[str, ...] = tuple(str(k + 1) for k in range(width))
+        return Layout(head.encoding, style, names, skip, some)
+    names = _names(rows[header] if len(rows[header]) == width else spaced[header], rows[skip])
+    units = _units(rows[header + 1 : skip], names)
+    return Layout(head.encoding, style, names, skip, some, units, header)
+
+
+def _width(rows: Rows) -> int:
+    """How many cells most rows of the second half have."""
+    return Counter(len(row) for row in rows[len(rows) // 2 :]).most_common(1)[0][0]
+
+
+def _counting(rows: Rows, width: int, style: Style) -> tuple[int, ...]:
+    """The columns that hold numbers or times in most rows of the second half."""
+    wide = [row for row in rows[len(rows) // 2 :] if len(row) == width]
+    wide = wide[:: max(1, len(wide) // _SOME)]
+    found = [k for k in range(width) if 2 * sum(_is_value(r[k], style) for r in wide) >= len(wide)]
+    return tuple(found)
+
+
+def _is_value(cell: str, style: Style) -> bool:
+    return style.is_number(cell) or is_stamp(cell) or is_date(cell)
+
+
+def _good(row: Sequence[str], counting: Sequence[int], style: Style) -> int:
+    """How many of the columns that hold numbers or times do so in a row."""
+    return sum(k < len(row) and _is_value(row[k], style) for k in counting)
+
+
+def _first_row(rows: Rows, counting: Sequence[int], style: Style, header_line: int | None) -> int:
+    """Index of the first row that is one of the table, as those that follow it are."""
+    start = header_line or 0
+    looked = 3  # rows: a line with a number above the header is followed by what is none
+    fits = [2 * _good(row, counting, style) > len(counting) for row in rows]
+    for index in range(start, len(rows)):
+        following = fits[index : index + looked]
+        if following[0] and 2 * sum(following) > len(following):
+            return index
+    raise InputError(
+        f"has no rows of numbers below line {start} that are as wide as most of its lines; "
+        "correct header_line, delimiter or decimal in the map"
+    )
+
+
+def _header(rows: Rows, spaced: Rows, skip: int, header_line: int | None) -> int | None:
+    """Index of the row with the names of the columns; None where there is none."""
+    width = len(rows[skip])
+    if header_line is not None:
+        top = header_line - 1
+        if not {len(rows[top]), len(spaced[top])} & set(_widths(rows[skip])):
+            raise InputError(
+                f"line {top + 1} has {len(rows[top])} names, the rows have {width} cells; "
+                "state header_line, delimiter or decimal in the map"
+            )
+        return top
+    near = range(skip - 1, max(skip - 6, -1), -1)  # names, units, types, descriptions, an empty one
+    fitting = [k for k in near if {len(rows[k]), len(spaced[k])} & set(_widths(rows[skip]))]
+    for k in fitting:
+        row = rows[k] if len(rows[k]) in _widths(rows[skip]) else spaced[k]
+        filled = [cell for cell in row if cell]
+        if len(filled) >= width - 1 and len(set(filled)) == len(filled) and _is_names(filled):
+            return k
+    named = [k for k in fitting if any(re.search(r"\w", cell) for cell in rows[k])]
+    if named:
+        return named[-1]
+    above = next((rows[k] for k in near if any(rows[k])), [])
+    if len(above) > 1:
+        raise InputError(
+            f"line {skip} has {len(above)} names, the rows have {width} cells; "
+            "state header_line, delimiter or decimal in the map"
+        )
+    return None
+
+
+def _widths(row: Sequence[str]) -> tuple[int, ...]:
+    """How many names a row may have: rows may end in a delimiter, and times have a date before."""
+    dated = any(is_date(a) and is_stamp(b) for a, b in pairwise(row))
+    return (len(row), len(row) - 1) if not row[-1] or dated else (len(row),)
+
+
+def _is_names(cells: Sequence[str]) -> bool:
+    """Whether cells are names, and neither units nor numbers nor a line that is drawn."""
+    units = sum(is_usual_unit(cell.strip("[]() ")) for cell in cells)
+    words = sum(1 for cell in cells if re.search(r"[^\W\d_]", cell))
+    return 2 * units < len(cells) and 2 * words > len(cells)
+
+
+def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
+    """The names of all columns: of those without one their numbers."""
+    names = list(header)
+    if len(names) < len(row) and row[-1]:
+        place = next(k for k, cell in enumerate(row) if is_date(cell))
+        names.insert(place, "date")
+    names += [""] * (len(row) - len(names))
+    return tuple(name or str(k + 1) for k, name in enumerate(names))
+
+
+def _unit(cell: str) -> str:
+    """The unit that a cell is; "" where it is none."""
+    unit = cell.strip("[]() ")
+    return unit if is_unit(unit, *_UNITS_OF) or raw_unit(unit) else ""
+
+
+def _units(rows: Rows, names: Sequence[str]) -> tuple[str, ...]:
+    """Those in the first row between names and numbers that has some; "" of a column without."""
+    for row in rows:
+        units = [_unit(cell) for cell in row]
+        if any(units) and len(units) >= len(names) - 1:
+            return (*units, "")[: len(names)]
+    return ()
+
+
+DIALECT = Dialect("tables of text", ENDINGS, read)

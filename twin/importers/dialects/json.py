@@ -1,0 +1,34 @@
+"""JSON: arrays by name, a matrix, one object a row, or tables within tables.
+
+The columns of a matrix are ``name[1]``, ``name[2]``, ...; a list of as many names beside it names
+them.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from twin.errors import InputError
+from twin.importers.dialects import Dialect
+from twin.importers.mapping import ImportMap
+from twin.importers.nested import ROWS, flat, recordings_of
+from twin.importers.table import SignalTable, chosen, parsing
+
+
+def read(path: Path, mapping: ImportMap) -> SignalTable:
+    """Columns of a JSON file; raises InputError."""
+    with parsing("JSON"):
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        columns = flat(content if isinstance(content, dict) else {ROWS: content})
+    wanted = mapping.column_names()
+    if not wanted and (found := recordings_of(columns)):
+        some = next(name for name in columns if name.startswith(found[0]))
+        raise InputError(
+            f"holds {len(found)} recordings: {', '.join(found)}; give each as a file of its own, "
+            f"or name the columns of one in a map, such as '{some}'"
+        )
+    return SignalTable({name: columns[name] for name in chosen(wanted, columns)})
+
+
+DIALECT = Dialect("JSON", (".json",), read)

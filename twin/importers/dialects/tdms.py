@@ -1,0 +1,34 @@
+"""TDMS of LabVIEW: a channel is named ``group/channel``; its waveform may state the rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from twin.errors import InputError
+from twin.importers.dialects import Dialect
+from twin.importers.mapping import ImportMap
+from twin.importers.table import SignalTable, chosen, extra, parsing, require_fits
+
+_PERIOD = "wf_increment"  # s a sample
+
+
+def read(path: Path, mapping: ImportMap) -> SignalTable:
+    """Columns of a TDMS file; raises InputError."""
+    nptdms = extra("nptdms")
+    with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
+        channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
+        read = {name: channels[name] for name in chosen(mapping.column_names(), channels)}
+        require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
+        periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
+        for name, period in periods.items():
+            first, expected = next(iter(periods.items()))
+            if period != expected or not period > 0.0:
+                raise InputError(
+                    f"channel '{first}' has a sample every {expected:.9g} s, '{name}' every "
+                    f"{period:.9g} s; export them at one rate"
+                )
+        rate = 1.0 / next(iter(periods.values())) if periods else None
+        return SignalTable({name: c[:] for name, c in read.items()}, rate)
+
+
+DIALECT = Dialect("TDMS of LabVIEW", (".tdms",), read)

@@ -1,0 +1,72 @@
+"""A sample rate that a file states in words: "Sample Period: 5 ms", "Abtastrate;1 kHz"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+# How often, and how long a sample is; the time of a recording or a log is how long that lasts.
+_SAMPLES = r"(?:sampl\w*|abtast\w*|scan\w*)"
+_LOGS = r"(?:record\w*|logg?\w*|acqui\w*|mess\w*|aufzeichn\w*|frame|update)"
+_RATE = (
+    rf"(?:(?:{_SAMPLES}|{_LOGS})[\s_\-]*(?:rate|freq\w*|takt)|abtast(?:rate|frequenz)|samplerate"
+    r"|fréquence d.échantillonnage|采样(?:频率|率)|サンプリング周波数|^\W*(?:rate|fps)|\bf_?s)"
+)
+_PERIOD = (
+    rf"(?:{_SAMPLES}[\s_\-]*(?:time|zeit|step)|(?:{_SAMPLES}|{_LOGS})[\s_\-]*(?:period|interval)\w*"
+    r"|abtast(?:zeit|intervall|periode)|tastzeit|zykluszeit|taktzeit|cycle[\s_]*time|time[\s_]*step"
+    r"|période d.échantillonnage|采样(?:周期|间隔)|サンプリング(?:周期|間隔)"
+    r"|^\W*(?:period|interval|increment|delta[\s_]*t)|\bt_?s|\bd_?t)"
+)
+_RATES = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "sa/s": 1.0, "ks/s": 1e3, "sps": 1.0,
+          "samples/s": 1.0, "1/s": 1.0, "fps": 1.0}  # fmt: skip
+_PERIODS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6,
+            "μs": 1e-6, "ns": 1e-9, "min": 60.0}  # fmt: skip
+_UNIT = "|".join(sorted(map(re.escape, {**_RATES, **_PERIODS}), key=len, reverse=True))
+_STATEMENT = re.compile(
+    rf"(?:(?P<rate>{_RATE})|{_PERIOD})(?:[\s_]*(?:in\s+)?[\[(]?(?P<own>{_UNIT})\b[\])]?)?"
+    rf"[^\w+-]+(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)[\s\"]*(?P<unit>(?:{_UNIT})(?![\w/]))?",
+    re.IGNORECASE,
+)
+_LONGEST = 300  # characters of a line that states a rate
+
+
+@dataclass(frozen=True)
+class StatedRate:
+    """A rate in Hz, None where the unit of what is stated is not; text: the words that state it."""
+
+    rate: float | None
+    text: str
+
+
+def stated_rate(texts: Iterable[str]) -> StatedRate | None:
+    """The first rate that any of these texts states; one without a unit where no other is."""
+    unsure = None
+    for text in texts:
+        plain = re.sub(r"(?<!\d),|,(?!\d)|[;\t|]", " ", text[:_LONGEST])
+        for found in _STATEMENT.finditer(plain):
+            rate = _rate_of(found)
+            stated = StatedRate(rate, " ".join(text.replace("\t", " ").split())[:80])
+            if rate is not None:
+                return stated
+            unsure = unsure or stated
+    return unsure
+
+
+def _rate_of(found: re.Match[str]) -> float | None:
+    number = float(found["number"].replace(",", "."))
+    slowest = 20.0  # Hz, of a log that a drive is identified from: 1,000 Hz are no 1 Hz
+    if found["rate"] and number < slowest and re.fullmatch(r"\d{1,2},\d{3}", found["number"]):
+        number *= 1000.0
+    unit = (found["unit"] or found["own"] or "").lower()
+    if number <= 0.0:
+        return None
+    if unit in _RATES:
+        return number * _RATES[unit]
+    if unit in _PERIODS:
+        return 1.0 / (number * _PERIODS[unit])
+    if found["rate"]:
+        return number
+    longest = 0.5  # s a sample, of what is recorded to be identified; more is in another unit
+    return 1.0 / number if number < longest else None

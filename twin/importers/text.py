@@ -1,0 +1,309 @@
+"""Tables of text: how a file is cut into lines and cells, and its columns, read or refused.
+
+What dialects share. A dialect finds the names and the first row (``Layout``) in the beginning of
+the file (``Head``); ``read_table`` reads all rows. Cells that are no numbers are told all at once.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import itertools
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import cached_property
+from operator import methodcaller
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from twin.errors import InputError
+from twin.importers.bad_cells import BadCells, Row
+from twin.importers.mapping import ImportMap
+from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
+from twin.importers.table import SignalTable, chosen
+
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+HEAD = 1 << 16  # bytes in which a dialect is known and its first row is found
+_DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")
+)  # fmt: skip
+_ENDS = re.compile(r"\r\n|\r|\n")
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a line is cut into cells, and how a cell is a number."""
+
+    delimiter: str | None
+    decimal: str
+
+    def cells(self, line: str) -> list[str]:
+        """The cells of a line; one that begins with # has no other first cell for that."""
+        text = line.strip(" \r\n").removeprefix("#").strip(" ")
+        if self.delimiter is None:
+            return text.split()
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
+
+    def value(self, cell: str) -> float:
+        """The number in a cell, which may group its thousands; raises ValueError."""
+        try:
+            return float(cell.replace(self.decimal, "."))
+        except ValueError:
+            other = "." if self.decimal == "," else ","
+            if not re.fullmatch(rf"[-+]?\d{{1,3}}([{other}'’ \xa0]\d{{3}})+([.,]\d+)?", cell):
+                raise
+            return float(re.sub(rf"[{other}'’ \xa0]", "", cell).replace(self.decimal, "."))
+
+    def is_number(self, cell: str) -> bool:
+        """Whether a cell is a number."""
+        try:
+            self.value(cell)
+        except ValueError:
+            return False
+        return True
+
+    def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
+        """Of the cells of ``lines``; 0 where most of them have fewer than so many columns."""
+        rows = [self.cells(line) for line in lines]
+        if sum(len(row) >= columns for row in rows) * 2 <= len(rows):
+            return 0.0
+        cells = list(itertools.chain.from_iterable(rows))
+        return sum(map(self.is_number, cells)) / max(len(cells), 1)
+
+
+@dataclass(frozen=True)
+class Head:
+    """The beginning of a file of text: its whole lines, less empty ones at the end of the file."""
+
+    encoding: str
+    lines: tuple[str, ...]
+
+    @classmethod
+    def of(cls, path: Path) -> Head:
+        """The beginning of a file; raises InputError where it has no text."""
+        with open(path, "rb") as stream:
+            data = stream.read(HEAD)
+            whole = not stream.read(1)
+        encoding = _encoding(data)
+        lines = _ENDS.split(data.decode(encoding, errors="replace"))
+        lines = lines if whole else lines[:-1]
+        while lines and not lines[-1].strip():
+            lines.pop()
+        if not lines:
+            raise InputError("has no line of text; give a table of numbers")
+        return cls(encoding, tuple(lines))
+
+    def style(self, stated: ImportMap) -> Style:
+        """The style of its rows of numbers; raises InputError where it has none."""
+        # Of the second half, which is numbers, every so manieth line: the last ones may be of whole
+        # numbers, which have no decimal sign.
+        rows = self.lines[len(self.lines) // 2 :]
+        lines = (*rows[:: -(-len(rows) // 40)], rows[-1])
+        delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
+        decimals = (stated.decimal,) if stated.decimal else (".", ",")
+        styles = [Style(d, p) for d in delimiters for p in decimals if d != p]
+        for columns in (2, 1):  # 1,5 is two columns, unless the map states delimiter or decimal
+            best = max(styles, key=lambda style: style.share_of_numbers(lines, columns))
+            if best.share_of_numbers(lines, columns) > 0.0:
+                return best
+        raise InputError("has no rows of numbers; state delimiter and decimal in the map")
+
+
+def _encoding(head: bytes) -> str:
+    for mark, encoding in _MARKS:
+        if head.startswith(mark):
+            return encoding
+    # Of UTF-16 without a mark every other byte of what is written in ASCII is 0.
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        zeros, others = head[first::2].count(0), head[1 - first :: 2].count(0)
+        if zeros > 0.5 * len(head) / 2 and not others:
+            return encoding
+    try:
+        head[: head.rfind(b"\n") + 1].decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"  # what programs on Windows write where it is not UTF-8
+    return "utf-8"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the rows of a file are, and what their columns are called.
+
+    names: of the columns, each with its unit in ``units`` ("" or nothing: none). skip: lines before
+    the first row of numbers. header: the index of the line with the names, None without one. rows:
+    some rows of the beginning, as cells. sample_rate (Hz), start_ns: if stated. is_row: whether a
+    line is a row at all, None where each is. end: how the line behind the last row begins. said:
+    what is told.
+    """
+
+    encoding: str
+    style: Style
+    names: tuple[str, ...]
+    skip: int
+    rows: Sequence[Sequence[str]] = field(repr=False)
+    units: tuple[str, ...] = ()
+    header: int | None = None
+    sample_rate: float | None = None
+    start_ns: int | None = None
+    is_row: Callable[[str], bool] | None = None
+    end: str | None = None
+    said: tuple[str, ...] = ()
+
+    def called(self, asked: Collection[str]) -> list[str]:
+        """The names of the columns, with their units unless they are asked for without."""
+        units = self.units or ("",) * len(self.names)
+        both = zip(self.names, units, strict=True)
+        return [n if not unit or n in asked or n.endswith(("]", ")")) else f"{n} [{unit}]"
+                for n, unit in both]  # fmt: skip
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """What each column holds by most of the first rows: "number", "stamp", "date", "text"."""
+        return tuple(self._kind(k) for k in range(len(self.names)))
+
+    def _kind(self, column: int) -> str:
+        cells = [row[column] for row in self.rows if column < len(row) and row[column]]
+        found = Counter(self._kind_of(cell) for cell in cells)
+        return found.most_common(1)[0][0] if found else "text"
+
+    def _kind_of(self, cell: str) -> str:
+        if self.style.is_number(cell):
+            return "number"
+        return "stamp" if is_stamp(cell) else "date" if is_date(cell) else "text"
+
+    def plain(self, stream: TextIO) -> Iterable[str]:
+        """The rows of an open file with a point as decimal sign."""
+        rows: Iterable[str] = itertools.islice(stream, self.skip, None)
+        if (end := self.end) is not None:
+            rows = itertools.takewhile(lambda line: not line.startswith(end), rows)
+        if self.is_row is not None:
+            rows = filter(self.is_row, rows)
+        comma = self.style.decimal == ","
+        return map(methodcaller("replace", ",", "."), rows) if comma else rows
+
+    def lines(self, path: Path) -> Generator[tuple[int, str]]:
+        """The rows of a file with the number of each line, as they are written."""
+        with open(path, encoding=self.encoding, errors="replace") as stream:
+            for number, line in itertools.islice(enumerate(stream, 1), self.skip, None):
+                if self.end is not None and line.startswith(self.end):
+                    return
+                if self.is_row is None or self.is_row(line):
+                    yield number, line
+
+
+def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
+    """The columns of a table that a map names, all where it names none; raises InputError."""
+    asked = mapping.column_names()
+    names = layout.called(asked)
+    wanted = {name: names.index(name) for name in chosen(asked, names)}
+    places = {**wanted, **_dates_of(wanted, layout, names)}
+    text = {n: k for n, k in places.items() if layout.kinds[k] == "text"}
+    if asked and text:
+        raise InputError(_of_text(layout, *next(iter(text.items()))))
+    where = [k for name, k in places.items() if name not in text]
+    said = layout.said
+    try:
+        read = _by_numpy(path, layout, where)
+    except ValueError:
+        read, more = _row_by_row(path, layout, where, every=not asked)
+        said = (*said, *more)
+    for k in text.values():
+        first = next((row[k] for row in layout.rows if k < len(row)), "")
+        read[k] = np.array([first])
+    columns = {name: read[k] for name, k in places.items()}
+    columns = {n: c for n, c in joined_with_dates(columns).items() if n in wanted}
+    above = tuple(_head_lines(path, layout))
+    return SignalTable(columns, layout.sample_rate, layout.start_ns, layout.skip + 1, said, above)
+
+
+def _of_text(layout: Layout, name: str, column: int) -> str:
+    """What is wrong with a column of which most cells are neither numbers nor times."""
+    cells = [row[column] for row in layout.rows if column < len(row) and row[column]]
+    if not cells:
+        return f"column '{name}' is empty; leave it out of the map"
+    clock = ", or give sample_rate (Hz) in place of time" if ":" in cells[0] else ""
+    return (
+        f"column '{name}' holds text, such as {cells[0]!r}, no numbers and no times such as "
+        f"2024-05-01 12:00:00.001; correct it{clock}"
+    )
+
+
+def _head_lines(path: Path, layout: Layout) -> Iterator[str]:
+    """The lines above the rows, in which a file may state its rate."""
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        yield from (line.rstrip("\r\n") for line in itertools.islice(stream, layout.skip))
+
+
+def _dates_of(wanted: Iterable[str], layout: Layout, names: Sequence[str]) -> dict[str, int]:
+    """The columns of dates, where a stamp that is asked for has none of its own."""
+    if all(layout.kinds[names.index(name)] != "stamp" for name in wanted):
+        return {}
+    return {names[k]: k for k, kind in enumerate(layout.kinds) if kind == "date"}
+
+
+def _by_numpy(path: Path, layout: Layout, where: Sequence[int]) -> dict[int, NDArray]:
+    """The columns at some places; raises ValueError where any cell is not what it must be."""
+    stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
+    with open(path, encoding=layout.encoding, errors="replace") as stream:
+        values = np.loadtxt(
+            layout.plain(stream), delimiter=layout.style.delimiter, usecols=where, comments=None,
+            quotechar='"',
+            dtype=np.dtype([(str(k), "i8" if k in stamps else "f8") for k in where]), ndmin=1,
+            encoding=None, converters={k: own.add for k, own in stamps.items()},
+        )  # fmt: skip
+    columns = {k: np.ascontiguousarray(values[str(k)]) for k in where}
+    return {k: stamps[k].times(c) if k in stamps else c for k, c in columns.items()}
+
+
+def _row_by_row(
+    path: Path, layout: Layout, where: Sequence[int], every: bool
+) -> tuple[dict[int, NDArray], tuple[str, ...]]:
+    """The same where some lines are no rows, and sentences about those that were left out.
+
+    every: all columns are read to be looked at, so that what is no number is NaN there. Raises
+    InputError that names all bad cells.
+    """
+    stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
+    bad = BadCells(layout.names, len(layout.names))
+    header = _header_cells(path, layout)
+    columns: dict[int, list[float]] = {k: [] for k in where}
+    with closing(layout.lines(path)) as lines:
+        for number, line in lines:
+            cells = layout.style.cells(line)
+            if not any(cells):
+                continue
+            if header is not None and cells == header:
+                bad.add_header(number)
+                continue
+            row = Row(number, line, cells)
+            for k in where:
+                cell = cells[k] if k < len(cells) else ""
+                try:
+                    columns[k].append(stamps[k].add(cell) if k in stamps else
+                                      layout.style.value(cell))  # fmt: skip
+                except ValueError:
+                    bad.add(row, k)
+                    columns[k].append(-1 if k in stamps else np.nan)
+            bad.end_row(row, where)
+    left_out = bad.left_out()
+    kept = np.setdiff1d(np.arange(len(columns[where[0]])), left_out.rows)
+    if not every or bad.has_header or any(k in bad.columns for k in stamps):
+        bad.require_none(left_out)
+    read: dict[int, NDArray] = {k: np.array(c)[kept] for k, c in columns.items() if k not in stamps}
+    read |= {k: own.times(np.array(columns[k], np.int64)[kept]) for k, own in stamps.items()}
+    return read, left_out.said
+
+
+def _header_cells(path: Path, layout: Layout) -> list[str] | None:
+    """The cells of the line with the names; None where there is none."""
+    if layout.header is None:
+        return None
+    line = next(itertools.islice(_head_lines(path, layout), layout.header, None), None)
+    return None if line is None else layout.style.cells(line)
