@@ -22,11 +22,12 @@ from benchmarks.drives import CATALOGUE, HIDDEN, KNOWN
 from benchmarks.figures import Figure, Target, report
 from benchmarks.judgement import Expected, Row, judged, row_of, stated_wrong
 from benchmarks.second_simulator.drives import DRIVES, Plant, Recorder, log_of
+from identify.adding import add
 from identify.analysis.first_model import first_model
 from identify.estimation.fit import error_in
 from identify.output.words.next_step import next_commands
 from identify.results.results import Diagnosis
-from identify.workflow import add, diagnose, fit
+from identify.workflow import diagnose, fit
 from twin.logs import AxisLog, Log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel

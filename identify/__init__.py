@@ -15,6 +15,7 @@ TYPE_CHECKING = False  # without the 10 ms of typing, in which `twin` does not h
 if TYPE_CHECKING:
     from typing import Any
 
+    from identify.adding import *
     from identify.workflow import *
 
 __all__ = [
@@ -33,10 +34,10 @@ def __getattr__(name: str) -> Any:
     """
     if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    from identify import workflow
+    from identify import adding, workflow
     from twin.threads import one_for_matrices
 
-    found = getattr(workflow, name)
+    found = getattr(adding if hasattr(adding, name) else workflow, name)
     return found if isinstance(found, type) else one_for_matrices(found)
 
 

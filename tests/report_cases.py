@@ -7,7 +7,7 @@ from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
-from identify import workflow
+from identify import adding, workflow
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
 from identify.results.results import Addition, Comparison, Diagnosis, summary_of
@@ -89,7 +89,7 @@ def cogging_case() -> Case:
     return Case(
         model, fit, held,
         workflow.diagnose(model, fit, held, catalogue=few),
-        workflow.add(catalogue["cogging"], model, fit, held),
+        adding.add(catalogue["cogging"], model, fit, held),
     )  # fmt: skip
 
 

@@ -18,8 +18,8 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "rules", "dataset", "estimation", "analysis", "frequency", "selection", "links",
-    "validation", "experiment_design", "results", "output", "workflow", "view", "testing", "demo",
-    "cli", "start",
+    "validation", "experiment_design", "results", "output", "workflow", "adding", "view", "testing",
+    "demo", "cli", "start",
 )  # fmt: skip
 LOG_ROOMS = {"logs", "importers", "checks"}
 MOST_FLOORS = 11  # the table of rules is the lowest: what is decided in a dataset is in it too

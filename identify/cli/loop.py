@@ -235,7 +235,7 @@ def add(
 
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
-    from identify import workflow
+    from identify import adding
     from identify.links import LINK_MASS
     from identify.output.as_json import found_in
 
@@ -243,11 +243,11 @@ def add(
     job: Callable[..., Any]  # an Addition, AllAdded or a CorrectedBody
     if found:
         with_all = found_in(Path(effect), machine, catalogue)
-        job = partial(workflow.add_found, with_all, test_function=test_function)
+        job = partial(adding.add_found, with_all, test_function=test_function)
     elif file := _copy_of(machine, out) if effect == LINK_MASS else None:
-        job = partial(workflow.correct_body, file=file.name, test_function=test_function)
+        job = partial(adding.correct_body, file=file.name, test_function=test_function)
     else:
-        call = workflow.add_shape if shape else workflow.add
+        call = adding.add_shape if shape else adding.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
     done: Done[Any] = with_logs(job, machine, logs, holdout, test, fits=True)
     _save_with_bodies(done.result.model, out, machine)

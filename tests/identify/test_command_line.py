@@ -15,7 +15,7 @@ from cli_runs import RATE, in_small, refusal, twin
 from planted_logs import SLIDE, Ride, having, logged
 from strict_json import strict, valid
 
-from identify import workflow
+from identify import adding, workflow
 from identify.cli import main
 from identify.cli.command import OUTPUTS, Command
 from identify.cli.shared import CheckedRecordings, Recordings, app
@@ -299,7 +299,7 @@ def called(name: str, slide: Path) -> object:
         )  # fmt: skip
     if name == "add":
         effect = catalogue["quadratic_drag"]
-        return workflow.add(effect, model, fit, held, test, axis="x", test_function=0.07)
+        return adding.add(effect, model, fit, held, test, axis="x", test_function=0.07)
     call = {"fit": workflow.fit, "diagnose": workflow.diagnose}[name]
     return call(model, fit, held, test, catalogue=catalogue, test_function=0.07)
 

@@ -10,7 +10,7 @@ import pytest
 from constructed import log_of
 from planted_logs import RATE, RUBS, SLIDE, Ride, few, having, logged
 
-from identify import workflow
+from identify import adding, workflow
 from identify.dataset.preparation import datasets
 from identify.dataset.spectrum import fitted_levels
 from identify.estimation.intervals import NotExcited
@@ -91,10 +91,10 @@ LENGTH = 0.1  # s, longer than a move of these
 
 
 def test_a_friction_that_sticks_is_not_added_where_the_axis_always_rests():
-    told = refused(workflow.add, "coulomb_viscous", BARE, RESTING, test_function=LENGTH)
+    told = refused(adding.add, "coulomb_viscous", BARE, RESTING, test_function=LENGTH)
     assert told.startswith("rests: axis x comes to rest within every test function of 0.1 s")
     both = {"rests": RESTING["rests"], "run": logged(SLIDE, Ride(3, 4.0))}
-    added = workflow.add("coulomb_viscous", BARE, both, test_function=LENGTH)
+    added = adding.add("coulomb_viscous", BARE, both, test_function=LENGTH)
     assert added.model.axes["x"]["coulomb_viscous"].values["Fc"] == pytest.approx(0.31, rel=0.05)
 
 

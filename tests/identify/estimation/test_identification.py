@@ -13,7 +13,7 @@ from emps_published import direction_dependent, identify, load, prediction_error
 from machines import CATALOGUE, one_axis, tracked
 from machines import PROTON as NOMINAL
 
-from identify import workflow
+from identify import adding, workflow
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import Outcome, finished
 from identify.estimation.intervals import OpenSided, Side, estimates
@@ -121,7 +121,7 @@ def test_true_values_are_not_told_and_what_is_said_to_be_the_same_force_is() -> 
     held = replace(NOMINAL.axes["x"], mass_fixed=True)
     model = NOMINAL.with_axis("x", held)
     effect = CATALOGUE[found.changes[0].alike[0]]
-    added = workflow.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
+    added = adding.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
     assert added.step.fit_error_after < 1.01 * found.refitted
 
 

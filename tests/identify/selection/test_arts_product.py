@@ -10,10 +10,11 @@ import pytest
 from machines import CATALOGUE
 from scipy.optimize import least_squares
 
+from identify.adding import add
 from identify.dataset.dataset import Role
 from identify.estimation.fit import error_in
 from identify.selection.diagnosis import Verdict
-from identify.workflow import add, diagnose
+from identify.workflow import diagnose
 from twin.importers import import_log, load_mapping
 from twin.model.file import load_model
 

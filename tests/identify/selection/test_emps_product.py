@@ -12,9 +12,10 @@ import pytest
 from emps_published import direction_dependent, identify, prediction_error, symmetric
 from machines import CATALOGUE
 
+from identify.adding import add
 from identify.output.words.diagnosis import remarks_on
 from identify.selection.diagnosis import Verdict
-from identify.workflow import add, diagnose
+from identify.workflow import diagnose
 from twin.effects import Catalogue
 from twin.importers import import_log, load_mapping
 from twin.logs import read_log, write_log

@@ -13,6 +13,7 @@ import pytest
 from built_fits import PLAIN, axis_of, built_dataset, built_machine, fitted
 from machines import CATALOGUE, PROTON, one_axis, tracked
 
+from identify.adding import add
 from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.evidence import BLOCKS, effective_samples
 from identify.estimation.fit import Outcome, finished, fit_axis
@@ -28,7 +29,7 @@ from identify.selection.nonparametric import (
     nonparametric_labels,
     physics_alone,
 )
-from identify.workflow import add, fit
+from identify.workflow import fit
 from twin.effect import OUT, Effect, Kind, Parameter, X
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel

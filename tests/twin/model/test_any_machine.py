@@ -25,7 +25,7 @@ from axis_kinds import (
 )
 from machines import CATALOGUE
 
-from identify import workflow
+from identify import adding, workflow
 from identify.dataset.coordinates import coordinates_of
 from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
@@ -82,7 +82,7 @@ def gone_round(request, tmp_path_factory) -> Round:
     tried = Catalogue([CATALOGUE[n] for n in TRIED])
     found = workflow.diagnose(model, logs, held, catalogue=tried)
     assert found.effect is not None
-    added = workflow.add(found.effect, model, logs, held)
+    added = adding.add(found.effect, model, logs, held)
     return Round(request.param, axis, model, truth, logs, workflow.fit(truth, logs), found, added)
 
 
@@ -207,7 +207,7 @@ def test_a_machine_with_several_other_axes_refuses_an_effect_of_the_other_one() 
         assert "remove it" in str(told.value)
         assert "\n" not in str(told.value)
     with pytest.raises(InputError, match="axis y: axis_coupling depends on the other axis"):
-        workflow.add(CATALOGUE["axis_coupling"], machine(toml), {}, axis="y")
+        adding.add(CATALOGUE["axis_coupling"], machine(toml), {}, axis="y")
     with pytest.raises(InputError, match="axis z: axis_coupling depends on the other axis"):
         workflow.plan(
             machine(toml), catalogue=CATALOGUE, axis="z",

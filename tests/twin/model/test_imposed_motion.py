@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from machines import CATALOGUE
 
-from identify import workflow
+from identify import adding, workflow
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
@@ -52,7 +52,7 @@ def logs():
 
 
 def test_the_friction_of_an_imposed_motion_is_found_without_a_mass(logs) -> None:
-    added = workflow.add(CATALOGUE["dahl"], damper("coulomb_viscous"), *logs)
+    added = adding.add(CATALOGUE["dahl"], damper("coulomb_viscous"), *logs)
     found = added.model.axes["x"]
     assert added.kept
     assert found.mass == 0.0

@@ -1,0 +1,198 @@
+"""Grow a model by what it lacks: one effect, the shape of one, a body, or all that was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from identify.dataset.given_logs import require_moving
+from identify.estimation.free_curves import having_shape
+from identify.estimation.offered import require_shown
+from identify.links import corrected, suspects_of
+from identify.output.words.next_step import axis_in_words, notes_in_words
+from identify.results.results import (
+    Addition,
+    AllAdded,
+    CorrectedBody,
+    addition,
+    steps_together,
+)
+from identify.selection.acceptance import Judged, score
+from identify.selection.nonparametric import fit_nonparametric, physics_alone
+from identify.selection.trying import reshape, try_effect
+from identify.workflow import Model, as_given, fit, fit_as_given
+from twin.effect import Effect
+from twin.effects import Catalogue, load_catalogue
+from twin.errors import InputError
+from twin.logs import GivenLogs
+from twin.model.file import as_model
+from twin.model.machine import AxisModel
+from twin.mujoco.written import inertial
+from twin.parallel import Progress, parallel, silent
+
+
+@parallel()
+def add(
+    effect: Effect | str,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    axis: str | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> Addition:
+    """Add an effect to the axis that it helps most (or to ``axis``), refit and record the errors.
+
+    Nonparametric effects of the model are removed before a physical effect is added. Raises
+    InputError where the axis has the effect already.
+    """
+    model = as_model(model)
+    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
+    model.require_usable(effect, axis or next(iter(model.axes)))
+    given, model = model, model if effect.is_nonparametric else physics_alone(model)
+    parts = as_given(model, logs, holdout, test)
+    before = fit_as_given(*parts, Catalogue([]), test_function, progress, [effect])
+    names = [axis] if axis else list(before.fits)
+    for name in names:
+        model.axis(name)
+        require_moving(name, before.fits)
+    open_axes = [n for n in names if effect.name not in model.axes[n].names]
+    if not open_axes:
+        raise InputError(
+            f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
+            f"{f', {effect.numbered(effect.number + 1).name} is another' if effect.several else ''}"
+        )
+    attempt = fit_nonparametric if effect.is_nonparametric else try_effect
+    progress("adding", 0, 1)
+    shown = require_shown(effect, {n: (model.axes[n], before.datasets[n]) for n in open_axes})
+    tried = [attempt(before.fits[n], before.datasets[n], effect) for n in shown]
+    best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
+    having = [n for n in names if n not in open_axes]
+    made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
+
+
+@parallel()
+def add_found(
+    found: Model,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    catalogue: Catalogue | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> AllAdded:
+    """Add to a model all that a diagnosis of it found, refit, and record the errors.
+
+    found: the model with it, such as ``Diagnosis.model`` or what ``found_in`` reads of a saved
+    answer. Raises InputError where it has none of the axes of the model, or nothing beyond it.
+    """
+    known = load_catalogue() if catalogue is None else catalogue
+    with_all, given = as_model(found, known), as_model(model, known)
+    if with_all.axes.keys() != given.axes.keys():
+        raise InputError(
+            f"the answer is about a machine with axes {', '.join(with_all.axes)}, the model has "
+            f"{', '.join(given.axes)}; give the model that was diagnosed"
+        )
+    changed = {a: _changed(given.axes[a], with_all.axes[a]) for a in given.axes}
+    if not any(changed.values()) and with_all.mjcf == given.mjcf:
+        raise InputError(
+            f"{given.name}: the answer found nothing that this model lacks; diagnose it again"
+        )
+    job = partial(
+        fit, logs=logs, holdout=holdout, test=test, test_function=test_function, progress=progress
+    )
+    before, after = job(physics_alone(given)), job(with_all)
+    made, kept = replace(after.model, history=before.model.history), True
+    for axis, names in changed.items():
+        if names and axis in after.fits:
+            first, last, dataset = before.fits[axis], after.fits[axis], after.datasets[axis]
+            made = made.with_history(*steps_together(names, first, last, dataset))
+            gain = score(Judged(first, before.datasets[axis]), Judged(last, dataset))
+            kept = kept and gain.accepted
+    return AllAdded(made, before, made.history[len(given.history) :], kept)
+
+
+def _changed(given: AxisModel, other: AxisModel) -> dict[str, bool]:
+    """Laws that an axis has beyond another, or has free; and whether it is another shape of one."""
+    added = {f.effect.name: False for f in other.effects if f.effect.name not in given.names}
+    freed = [f.effect.name for f in given.effects if f.effect.name in other.names]
+    freed = [name for name in freed if given[name].fixed - other[name].fixed]
+    return added | dict.fromkeys(freed, True)
+
+
+@parallel()
+def correct_body(
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    file: str,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> CorrectedBody:
+    """The inertia that a body has by the logs, written into a copy of the machine's MuJoCo file.
+
+    file: name of the copy. Raises InputError where the axes are no joints, where the logs prove no
+    body to be another than in the file, and where no body can have the inertia found.
+    """
+    model = as_model(model)
+    if not model.joints:
+        raise InputError(
+            f"{model.name}: link_mass corrects a body of a MuJoCo file, and its axes are no joints "
+            "of one; add payload_mass, or begin with `twin new LOG --mjcf robot.xml`"
+        )
+    before = fit(
+        physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
+    )
+    found = suspects_of(before.model, before.fits, before.datasets, progress).body
+    if found is None or found.element is None:
+        what = "prove no body" if found is None else f"tell too little of body {found.body}"
+        raise InputError(
+            f"{model.mjcf_name}: the logs {what} to correct it; `twin diagnose` says what they show"
+        )
+    element = inertial(*found.element)
+    made = corrected(before.model, found, element, file)
+    return CorrectedBody(made, before.model, found, element)
+
+
+def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:
+    """An addition with what a reader should know; why_axis: why it went to its axis."""
+    kept, notes = notes_in_words(made)
+    return made.with_notes(kept, notes if why_axis is None else (why_axis, *notes))
+
+
+@parallel()
+def add_shape(
+    effect: Effect | str,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    axis: str | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> Addition:
+    """Give the law of an effect the shape that the logs show, refit and record the errors.
+
+    A free curve takes the law's place, or goes beside a friction law, which holds the axis at rest.
+    axis: that which it helps most where None. Raises InputError where no axis has the effect, where
+    its law assumes no curve, where the axis has a free curve already, and where the logs ask for
+    none.
+    """
+    model = as_model(model)
+    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
+    names = having_shape(effect, model, axis)
+    before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
+    fits = {n: before.fits[n] for n in names if n in before.fits}
+    if not fits:
+        require_moving(names[0], before.fits)
+    progress("adding", 0, 1)
+    best, shape = reshape(effect, fits, before.datasets)
+    return _with_notes(addition(best, fits[best.axis], before.datasets, before.model, model, shape))
