@@ -14,7 +14,7 @@ import numpy as np
 
 from identify.dataset.motion import Motion
 from identify.experiment_design.planting import signature
-from identify.output.machine import draw
+from identify.output.machine import draw, itself_in_words
 from twin.checks.report import Fault
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue, load_catalogue
@@ -110,6 +110,7 @@ def effect_page(effect: Effect, alike: Sequence[tuple[str, float]]) -> str:
         "The force that it adds to passes over the travel in both directions, ever slower.",
         f"**In the residual.** {_sentence(effect.fingerprint)}",
         f"**Excited by.** {_sentence(effect.excited_by)}",
+        f"**Is itself.** {_sentence(itself_in_words(effect))}",
         f"**Taken for.** {_alike_in_words(effect, alike)}",
         f"**Source.** {_sentence(effect.source)}",
         "## Parameters",

@@ -162,7 +162,7 @@ def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -
             for i, n in enumerate(which)
         )
 
-    seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD)
+    seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD, fewest_cycles=2.5)
     return Dataset("x", logs(names or ("run",), 1), logs(held, 11), lambda: seen)
 
 

@@ -23,7 +23,6 @@ from identify.estimation.evidence import BETTER, Evidence
 from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import RIDGE, ROUNDING, minimise, orthonormal, unabsorbed
-from identify.rules import RULE
 from twin.effect import Effect, Excitation, Kind, Parameter
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -78,7 +77,7 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     """
     excitation = with_what_repeats(base, dataset)
     nothing, absent = np.zeros(0), Fitted.at_start(effect)
-    shapes = _seen_to_repeat(effect, list(tried_shapes(effect, excitation)), base.logs)
+    shapes = _itself(effect, list(tried_shapes(effect, excitation)), excitation)
     found = [Start(shape, absent, nothing, nothing) for shape in shapes]
     whole = _Ground.of(base, dataset, effect, excitation, on_heads=False)
     # 12 shapes are few enough to be tried where the effect may be rare, as breakaways after rests
@@ -94,17 +93,15 @@ def starts(base: Fit, dataset: Dataset, effect: Effect) -> list[Start]:
     return sorted((first, *others), key=lambda s: s.squared_error)[:REFINED_STARTS]
 
 
-def _seen_to_repeat(
-    effect: Effect, shapes: list[dict[str, float]], logs: Sequence[PreparedLog]
+def _itself(
+    effect: Effect, shapes: list[dict[str, float]], excitation: Excitation
 ) -> list[dict[str, float]]:
-    """The shapes whose periods the logs show often enough to tell; all, where there are none.
+    """The shapes with which the effect is itself; all, where it is with none.
 
-    Harmonics of a longer one would fit better, as the others follow whatever else is slow.
+    Others would fit better, as harmonics of a period that is too long follow whatever is slow.
     """
-    lows, highs = zip(*(log.extent[1] for log in logs), strict=True)
-    longest = (max(highs) - min(lows)) / RULE.fewest_cycles
-    repeating = [p.name for p in effect.parameters if p.period]
-    return [s for s in shapes if all(s.get(p, 0.0) <= longest for p in repeating)] or shapes
+    begun = effect.starts(excitation)
+    return [s for s in shapes if not effect.imitation({**begun, **s}, excitation)] or shapes
 
 
 def _best(ground: _Ground, tried: Iterable[Start]) -> list[Start]:

@@ -61,6 +61,16 @@ def effects_text(effects: list[Effect]) -> str:
     return "\n".join(f"{e.name:{width}s}  {e.kind.name.lower():9s}  {e.summary}" for e in effects)
 
 
+def itself_in_words(effect: Effect) -> str:
+    """Where a law is itself, and what it is where the motion does not pass its knees."""
+    told = []
+    for knee in effect.knees:
+        sides = (("less", knee.below), ("more", knee.above))
+        others = (f"with {side} it is {law.value}" for side, law in sides if law)
+        told.append(f"where the motion passes its {knee.name}: {', '.join(others)}")
+    return "; ".join(told) or "on any motion"
+
+
 def effect_text(effect: Effect) -> str:
     """One effect in full."""
     rows = [
@@ -73,6 +83,7 @@ def effect_text(effect: Effect) -> str:
         f"source       {effect.source}",
         f"fingerprint  {effect.fingerprint}",
         f"excited by   {effect.excited_by}",
+        f"is itself    {itself_in_words(effect)}",
         "parameters   start value, unit, bounds, meaning",
         *rows,
         f"on a rotary axis a unit of m is one of {ROTARY.position}, N of {ROTARY.force}, kg of "

@@ -24,6 +24,7 @@ from identify.estimation.evidence import (
 from identify.estimation.fit import Fit, at_bounds, error_on
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
+from identify.estimation.scaling import AT_EDGE
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Excitation, Kind
@@ -147,8 +148,9 @@ def _imitation(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imi
     """What a law is where it is not itself; ended: labels of what a fit held where it still is."""
     effect, values = fitted.effect, fitted.values
     names = [label.split(".")[-1] for label in ended]
-    by_more = 1e-6  # of a value that ended: past the edge of what shows it
-    past = [{**values, n: values[n] * (1.0 + way * by_more)} for n in names for way in (-1, 1)]
+    past = [
+        {**values, n: values[n] * (1.0 + way * 2.0 * AT_EDGE)} for n in names for way in (-1, 1)
+    ]
     found = (effect.imitation(each, covered) for each in (values, *past))
     return next((one for one in found if one), None)
 
