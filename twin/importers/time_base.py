@@ -102,7 +102,8 @@ def rate_of_rounded(time: Array) -> float | None:
         return None
     digit = 10.0**-digits
     finest = 0.01  # of a period, that a time may be off; coarser digits than these are rounded
-    longer = np.rint(np.diff(elapsed) / digit) > np.floor(mean / digit + 1e-9)
+    steps = np.diff(scaled)
+    longer = np.rint(steps) > np.floor(mean / digit + 1e-9)
     few = 5  # steps of each of two lengths; one alone is a row that is lost or there twice
     if digit < finest * mean or min(longer.sum(), (~longer).sum()) < few:
         return None
