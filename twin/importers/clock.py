@@ -41,6 +41,7 @@ _UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": 
                "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
                "s": "s"}  # fmt: skip
 _SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+_OFF = 0.02  # of a rate or a time, by which two clocks that are one do not differ
 NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
 
 
@@ -100,7 +101,8 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     counters = [name for name, column in columns.items() if counts(name, column)]
     called, even = _candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])
-    found = called or ([] if stated is not None and stated.rate else even[:1])
+    rate = stated.rate if stated is not None else None
+    found = called or _agreeing(even, rate, [*columns], counters)
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
     if found:
@@ -109,6 +111,18 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
         line = f"sample_rate = {stated.rate:.9g} # Hz: the file states {stated.text!r}"
         return Clock((line,), 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
+
+
+def _agreeing(
+    even: Sequence[_Times], stated: float | None, names: Sequence[str], counters: Sequence[str]
+) -> list[_Times]:
+    """Of columns that nothing but even steps tells to be times the one that may be believed.
+
+    One whose rate the file states; else the first column of all, where none counts the samples.
+    """
+    if stated is not None:
+        return [one for one in even if abs(one.step * stated - 1.0) < _OFF][:1]
+    return [one for one in even if one.name == names[0] and not counters]
 
 
 def is_time(name: str) -> bool:
@@ -233,7 +247,7 @@ def _of_times(
         lines.append(
             f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}"
         )
-    if stated and stated.rate and abs(stated.rate * time.step - 1.0) > 0.02:
+    if stated and stated.rate and abs(stated.rate * time.step - 1.0) > _OFF:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
     return Clock(tuple(lines), time.step, used)
 
@@ -249,10 +263,10 @@ def _best(found: Sequence[_Times]) -> tuple[_Times, str]:
     stamps = [f for f in found if f not in recorded]
     if not recorded or not stamps:
         return first, ""
-    clock, off = recorded[0], 0.02  # of the time in all, by which two clocks do not differ
+    clock = recorded[0]
     for stamp in stamps:
         rising = float((np.diff(stamp.seconds) > 0.0).mean())
-        if rising > 0.9 and abs(stamp.duration / max(clock.duration, 1e-9) - 1.0) < off:
+        if rising > 0.9 and abs(stamp.duration / max(clock.duration, 1e-9) - 1.0) < _OFF:
             return stamp, ""
     what = f"take {stamps[0].duration:.4g} s" if stamps[0].duration > 0.0 else "stand still"
     return clock, f"; the times of {stamps[0].name} {what}, these {clock.duration:.4g} s"

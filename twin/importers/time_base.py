@@ -15,7 +15,6 @@ from twin.importers.table import numbers
 from twin.logs.log import Array
 from twin.logs.topics import instant
 from twin.numbers import first_not_finite
-from twin.signals import between
 
 _HOUR, _DAY = 3600.0, 86400.0  # s
 _TIMERS = (2.0**32, 2.0**24, 2.0**16)  # counts of a timer before it begins again
@@ -103,7 +102,8 @@ def rate_of_rounded(time: Array) -> float | None:
         return None
     digit = 10.0**-digits
     finest = 0.01  # of a period, that a time may be off; coarser digits than these are rounded
-    longer = np.rint(between(elapsed, digit)) > np.floor(mean / digit + 1e-9)
+    steps = np.diff(scaled)
+    longer = np.rint(steps) > np.floor(mean / digit + 1e-9)
     few = 5  # steps of each of two lengths; one alone is a row that is lost or there twice
     if digit < finest * mean or min(longer.sum(), (~longer).sum()) < few:
         return None

@@ -208,6 +208,8 @@ def test_a_motion_that_rises_is_no_time(tmp_path):
     rng = np.random.default_rng(2)
     write_csv(tmp_path / "a.csv", {"q": rising, "f": F})
     assert guess_map(tmp_path / "a.csv").missing[0].startswith("no column rises as times do")
+    write_csv(tmp_path / "a.csv", {"n": np.arange(COUNT), "ramp": 1e-4 * T, "q": Q, "f": F})
+    assert guess_map(tmp_path / "a.csv").missing[0].startswith("'n' counts the rows")
     uneven = np.cumsum(4.0 + rng.uniform(-0.4, 0.4, COUNT))
     write_csv(tmp_path / "a.csv", {"a": uneven, "q": rising, "f": F})
     assert 'time = {column = "a", unit = "ms"}' in proposed(tmp_path)
