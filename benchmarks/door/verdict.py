@@ -53,7 +53,7 @@ def judge(recording: Recording, text: str, seconds: float) -> Verdict:
     seen = set()
     for axis, entries in found.get("axes", {}).items():
         position = entries.get("position", {}).get("column")
-        truth = recording.columns.get(position)
+        truth = _of(recording, position or "")
         for entry, table in entries.items():
             if isinstance(table, dict) and "column" in table:
                 _judge_entry(out, entry, table, truth, lines.get((axis, entry), ""))
@@ -80,6 +80,11 @@ def _whole(recording: Recording) -> set[str]:
     return {a for a, h in holds.items() if "position" in h and h & {*FORCES, *CURRENTS}}
 
 
+def _of(recording: Recording, name: str) -> Written | None:
+    """What a column is; its dialect may have put a unit behind its name."""
+    return recording.columns.get(name) or recording.columns.get(name.rpartition(" [")[0])
+
+
 def _lines(text: str) -> dict[tuple[str, str], str]:
     axis, out = "", {}
     for line in text.splitlines():
@@ -93,7 +98,7 @@ def _lines(text: str) -> dict[tuple[str, str], str]:
 def _judge_entry(
     out: Verdict, entry: str, table: dict[str, Any], axis: Written | None, line: str
 ) -> None:
-    column = out.recording.columns.get(table["column"])
+    column = _of(out.recording, table["column"])
     name = f"{entry} = {table['column']}"
     if column is None or entry not in HOLDS or column.holds not in HOLDS[entry]:
         out.wrong.append(f"{name}: holds {column.holds if column else 'nothing of an axis'}")

@@ -95,9 +95,8 @@ class _Times:
 def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     """The time base of a table; columns: those of numbers (n,), all as long."""
     if table.sample_rate is not None:
-        rate = table.sample_rate
-        return Clock((f"# the file states its sample rate: {rate:g} Hz",), 1.0 / rate,
-                     tuple(n for n in columns if is_time(n)))  # fmt: skip
+        line = f"# the file states its sample rate: {table.sample_rate:g} Hz"
+        return Clock((line,), 1.0 / table.sample_rate, tuple(n for n in columns if is_time(n)))
     counters = [name for name, column in columns.items() if counts(name, column)]
     called, even = _candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])

@@ -184,7 +184,7 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch, case, module):
     write(tmp_path / name, table())
     monkeypatch.setitem(sys.modules, module, None)
     package = module.partition(".")[0]
-    with pytest.raises(InputError, match=rf"needs the package {package}.*\[import\]"):
+    with pytest.raises(InputError, match=rf"needs the package {package}.*pip install .*\[import\]"):
         import_log(tmp_path / name, mapping(tmp_path, named(pattern)))
 
 

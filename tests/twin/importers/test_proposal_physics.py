@@ -29,8 +29,9 @@ def test_the_motion_explains_the_force_that_moves_it_and_no_other():
     whole, turned, other = explained(SERVO.position, [SERVO.force, -SERVO.force, NOISE])
     assert whole.forward > 0.99
     assert whole.backward < 0.5
-    assert not whole.is_reversed
-    assert turned.is_reversed
+    assert not whole.is_turned
+    assert turned.is_turned
+    assert turned.accelerates == -1
     assert turned.backward == pytest.approx(whole.forward)
     assert other.best < 0.1
 
@@ -41,7 +42,7 @@ def test_one_way_tells_no_sign():
     force = -2.0 * np.gradient(np.gradient(position, t), t) - 3.0
     (found,) = explained(position, [force])
     assert not found.both_ways
-    assert not found.is_reversed
+    assert not found.is_turned
 
 
 def test_a_sine_tells_its_sign_by_friction_alone_and_none_without():
@@ -50,9 +51,9 @@ def test_a_sine_tells_its_sign_by_friction_alone_and_none_without():
     speed = np.gradient(position, t)
     for sign in (1.0, -1.0):
         (found,) = explained(position, [sign * np.gradient(speed, t)])
-        assert not found.is_reversed  # a spring would make the same
+        assert not found.is_turned  # a spring would make the same
     (found,) = explained(position, [3.0 * np.sign(speed) + 0.5 * np.gradient(speed, t)])
-    assert not found.is_reversed
+    assert not found.is_turned
     assert found.forward > found.backward
 
 

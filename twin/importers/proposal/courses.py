@@ -12,11 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from twin.importers.proposal.motion import thinned
+from twin.importers.proposal.motion import Explained, thinned
 from twin.signals import Array, between
 
 ALIKE = 0.95  # correlation of a position and its setpoint, at the lag of the loop
 SAME = 0.9999  # of two readings of one thing
+CHANCE = 0.1  # correlation of its noise with that of a force, of a column that nothing answers
 ENOUGH = 50_000  # rows that tell what the noise of a column is
 
 
@@ -192,16 +193,15 @@ def follows(position: Column, setpoint: Column, force: Column | None = None, sig
     least = 0.3  # samples, from which a lag is none of rounding
     votes += int(np.sign(behind)) if abs(behind) > least else 0
     if force is not None:
-        own, its = (sign * _answer(force, c) for c in (position, setpoint))
-        chance = 0.1  # correlation with a force that answers nothing
-        if (most := max(abs(own), abs(its))) > chance:
+        own, its = (sign * answer(force, c) for c in (position, setpoint))
+        if (most := max(abs(own), abs(its))) > CHANCE:
             weight = 3 if most > 0.3 else 1
             votes -= weight * int(np.sign(own)) * int(abs(own) > told * abs(its))
             votes += weight * int(np.sign(its)) * int(abs(its) > told * abs(own))
     return votes
 
 
-def _answer(force: Column, reading: Column) -> float:
+def answer(force: Column, reading: Column) -> float:
     """The largest correlation of the noise of a column with that of a force, up to 3 rows later.
 
     0 where there is no noise to answer.
@@ -211,6 +211,20 @@ def _answer(force: Column, reading: Column) -> float:
     a, b = (np.diff(c.smooth[reading.lively], 4) for c in (reading, force))
     found = [likeness(a[: len(a) - k], b[k:]) for k in range(4)]
     return max(found, key=abs)
+
+
+def sign_of(motion: Explained, position: Column, force: Column) -> int:
+    """The sign with which a force moves an axis; -1 where it is reversed.
+
+    By its inertia; where that is not sure by what it answers to the noise of the reading, which a
+    controller answers against it; where it answers nothing by friction alone.
+    """
+    if not motion.is_turned:
+        return 1
+    if motion.accelerates:
+        return motion.accelerates
+    answered = answer(force, position)
+    return -1 if abs(answered) < CHANCE else -int(np.sign(answered))
 
 
 def same(a: Column, b: Column) -> bool:

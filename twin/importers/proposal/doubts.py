@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from twin.importers.proposal.courses import Column, course, follows
+from twin.importers.proposal.courses import Column, course, follows, sign_of
 from twin.importers.proposal.motion import Explained, explained
 from twin.importers.proposal.units import near
 from twin.logs.log import AxisLog, Log
@@ -12,25 +12,36 @@ from twin.logs.log import AxisLog, Log
 
 def motion_of_force(axis: AxisLog) -> Explained | None:
     """What the motion of an axis explains of its force or current; None where it has neither."""
-    name = next((n for n in ("force", "current") if n in axis.columns), None)
-    if name is None or "position" not in axis.columns:
-        return None
-    position, force = (Column(n, axis.columns[n]).short for n in ("position", name))
-    return explained(position, [force])[0]
+    found = _columns(axis)
+    return None if found is None else explained(found[0].short, [found[1].short])[0]
 
 
 def doubts_of_log(log: Log) -> Iterator[str]:
     """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each."""
     for name, axis in log.axes.items():
-        motion = motion_of_force(axis)
-        if motion is not None:
-            yield from (f"axes.{name}: {what}" for what in _of_force(motion))
-        if {"position", "setpoint_position"} <= axis.columns.keys():
-            yield from (f"axes.{name}: {what}" for what in _of_setpoint(axis, motion))
+        found = _columns(axis)
+        if found is None:
+            continue
+        position, force = found
+        motion = explained(position.short, [force.short])[0]
+        sign = sign_of(motion, position, force)
+        yield from (f"axes.{name}: {what}" for what in _of_force(motion, sign))
+        if (goal := axis.columns.get("setpoint_position")) is not None:
+            setpoint = Column("setpoint_position", goal)
+            said = _of_setpoint(position, setpoint, force, sign)
+            yield from (f"axes.{name}: {what}" for what in said)
 
 
-def _of_force(motion: Explained) -> Iterator[str]:
-    if motion.is_reversed:
+def _columns(axis: AxisLog) -> tuple[Column, Column] | None:
+    """Position and force, or current; None where one is missing."""
+    name = next((n for n in ("force", "current") if n in axis.columns), None)
+    if name is None or "position" not in axis.columns:
+        return None
+    return Column("position", axis.columns["position"]), Column(name, axis.columns[name])
+
+
+def _of_force(motion: Explained, sign: int) -> Iterator[str]:
+    if sign < 0:
         yield (
             f"the motion explains {percent(motion.forward)} of the force, and with the sign "
             f"reversed {percent(motion.backward)}; give the force or the position sign = -1"
@@ -38,13 +49,11 @@ def _of_force(motion: Explained) -> Iterator[str]:
     elif motion.pushes:
         yield (
             "the force helps the motion where friction resists it (negative friction); a part of "
-            "the command is missing in this column, such as its feedforward: map the whole force; "
-            "or its sign is reversed"
+            "the command is missing in this column, such as its feedforward: map the whole force"
         )
 
 
-def _of_setpoint(axis: AxisLog, motion: Explained | None) -> Iterator[str]:
-    position, setpoint = (Column(n, axis.columns[n]) for n in ("position", "setpoint_position"))
+def _of_setpoint(position: Column, setpoint: Column, force: Column, sign: int) -> Iterator[str]:
     found = course(position, setpoint)
     if found is None:
         return
@@ -54,10 +63,7 @@ def _of_setpoint(axis: AxisLog, motion: Explained | None) -> Iterator[str]:
             f"the setpoint is {found.slope:.4g} times as large as the position; correct the unit, "
             "the scale or the sign of one of them"
         )
-    force = next((n for n in ("force", "current") if n in axis.columns), None)
-    column = None if force is None else Column(force, axis.columns[force])
-    sign = -1 if motion is not None and motion.is_reversed else 1
-    if follows(position, setpoint, column, sign) <= -2:
+    if follows(position, setpoint, force, sign) <= -2:
         yield (
             "position and setpoint_position look exchanged: the setpoint has the noise of a "
             "reading, and the force answers to it; exchange their columns"

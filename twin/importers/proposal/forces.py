@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from twin.importers.proposal.axes import DRIVING
-from twin.importers.proposal.courses import distinct, follows, same, sums
+from twin.importers.proposal.courses import distinct, follows, same, sign_of, sums
 from twin.importers.proposal.lexicon import Quantity, Role
 from twin.importers.proposal.motion import Explained
 from twin.importers.proposal.names import Name
@@ -89,7 +89,7 @@ def _of_those_called(file: File, axis: Axis, names: Sequence[Name]) -> Axis:
         if len(groups) > 1 and not (best := _clearly_best(best)):
             axis = _undecided(axis, field, [c for c in some if c.rank == max(o.rank for o in some)])
         elif best:
-            axis = _taken(axis, field, best[0])
+            axis = _taken(file, axis, field, best[0])
     return axis
 
 
@@ -135,31 +135,30 @@ def _undecided(axis: Axis, field: str, candidates: Iterable[Candidate]) -> Axis:
     })  # fmt: skip
 
 
-def _taken(axis: Axis, field: str, one: Candidate) -> Axis:
+def _taken(file: File, axis: Axis, field: str, one: Candidate) -> Axis:
     """With a column that its name tells, and what the motion says of it."""
     if one.motion.explains:
         sure, why = Certainty.SURE, f"so called, the motion explains {one.share} of it"
     else:
         sure, why = Certainty.UNSURE, f"so called, but the motion explains {one.share} of it only"
-    signal = Signal(field, one.name, sure, (why,))
-    axis = axis.having(_with_sign(signal, one.motion))
-    return replace(axis, motion=axis.motion or one.motion)
+    return _with_sign(file, axis, Signal(field, one.name, sure, (why,)), one.motion)
 
 
-def _with_sign(signal: Signal, motion: Explained) -> Signal:
-    if motion.is_reversed:
+def _with_sign(file: File, axis: Axis, signal: Signal, motion: Explained) -> Axis:
+    """With a force or current, and what the motion tells of its sign."""
+    position = file.column(axis.signals["position"].name)
+    sign = sign_of(motion, position, file.column(signal.name))
+    if sign < 0:
         why = (
             f"reversed, as it moves the mass with its sign -1: {100.0 * motion.backward:.0f} % "
             f"explained, as it is {max(100.0 * motion.forward, 0.0):.0f} %"
         )
-        return replace(signal, sign=-1).told(why, Certainty.LIKELY)
-    if motion.pushes:
-        why = (
-            "it helps the motion where friction resists it: a part of the force is missing in it, "
-            "or its sign is reversed"
-        )
-        return signal.told(why, Certainty.UNSURE)
-    return signal
+        signal = replace(signal, sign=-1).told(why, Certainty.LIKELY)
+    elif motion.pushes:
+        why = "it helps the motion where friction resists it: a part of the force is missing in it"
+        signal = signal.told(why, Certainty.UNSURE)
+    axis = axis.having(signal)
+    return axis if axis.motion else replace(axis, motion=motion, sign=sign)
 
 
 # --- forces that only the motion tells ------------------------------------------------------------
@@ -188,7 +187,7 @@ def _by_motion(file: File, axis: Axis, candidates: Sequence[Candidate]) -> Axis:
     if one.name.quantity in DRIVING:
         why, sure = f"so called, {why}", Certainty.SURE
     signal = Signal(field, one.name, sure, (why,))
-    return replace(axis.having(_with_sign(signal, one.motion)), motion=one.motion)
+    return _with_sign(file, axis, signal, one.motion)
 
 
 # --- what the force tells of the position ---------------------------------------------------------
@@ -221,7 +220,6 @@ def _votes(file: File, axis: Axis, position: Name, other: Name) -> int:
     """How surely another column is the setpoint of a position, and not the other way round."""
     force = axis.signals.get("force") or axis.signals.get("current")
     column = None if force is None else file.column(force.name)
-    sign = -1 if axis.motion is not None and axis.motion.is_reversed else 1
     if not file.course(position, other):
         return 0
-    return follows(file.column(position), file.column(other), column, sign)
+    return follows(file.column(position), file.column(other), column, axis.sign)

@@ -31,7 +31,8 @@ class Explained:
     forward: as the force that moves a mass against friction. backward: the same of the force with
     its sign reversed. free: of any signs. inertia, friction: what these make of the force in the
     free fit, RMS as a part of its own; negative where they help the motion.
-    helps: the part of what the forward fit leaves that Coulomb friction below 0 would take.
+    t_inertia: how sure the inertia is, over what is left. helps: the part of what the forward fit
+    leaves that Coulomb friction below 0 would take.
     both_ways: whether the axis moves in both directions; else no sign is told.
     """
 
@@ -40,26 +41,32 @@ class Explained:
     free: float
     inertia: float
     friction: float
+    t_inertia: float
     helps: float
     both_ways: bool
 
     @property
-    def is_reversed(self) -> bool:
-        """Whether the force moves the mass with its sign reversed alone.
+    def is_turned(self) -> bool:
+        """Whether the force moves a mass against friction with its sign reversed alone.
 
-        Friction alone does not tell it: that of a part of a command may be below 0.
+        So does the part of a command that takes back too large a feedforward of friction.
         """
         clear = 3.0  # times what that leaves, the sign as it is leaves; in any force a part is left
         left, right = 1.0 - self.forward, max(1.0 - self.backward, 0.02)
-        accelerates = self.inertia < -0.03  # of the force
-        return self.both_ways and self.explains and accelerates and left > clear * right
+        return self.both_ways and self.explains and left > clear * right
+
+    @property
+    def accelerates(self) -> int:
+        """The sign with which the force accelerates the mass; 0 where that is not sure."""
+        sure = 3.0  # t-value, from which the inertia is no accident
+        return int(np.sign(self.inertia)) if self.t_inertia > sure else 0
 
     @property
     def pushes(self) -> bool:
         """Whether the force helps the motion where friction resists it: a part of it is missing."""
         most = 0.5  # of what is left
         told = 0.1  # of the force
-        told_of = self.both_ways and self.explains and not self.is_reversed
+        told_of = self.both_ways and self.explains
         return told_of and (self.helps > most or self.friction < -told)
 
     @property
@@ -73,7 +80,7 @@ class Explained:
         return max(self.forward, self.backward)
 
 
-NOTHING = Explained(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+NOTHING = Explained(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 
 
 def thinned(column: Array) -> Array:
@@ -167,11 +174,15 @@ class Rows:
         moved, spread = free[0] * scaled[0], float(np.std(force)) * np.sqrt(len(force))
         rubbed = free[1] * scaled[1] + free[2] * scaled[2]
         against = np.sign(float(rubbed @ self.columns[1])) if told[1] else np.sign(free[2])
+        # test functions overlap, and so do what they leave
+        noise = (power - taken + 1e-12 * total) * 2.0 * OVERLAP / len(force)
+        error = np.sqrt(noise * np.linalg.pinv(gram, rcond=1e-10)[0, 0])
         return Explained(
             1.0 - (power - forward) / total, 1.0 - (power - backward) / total,
             1.0 - (power - taken) / total,
             float(np.sign(free[0]) * np.linalg.norm(moved) / spread),
             float(against * np.linalg.norm(rubbed) / spread),
+            float(abs(free[0]) / error) if error > 0.0 else 0.0,
             float((taken - forward) / (power - forward + 1e-6 * total)) if free[2] < 0.0 else 0.0,
             self.both_ways,
         )  # fmt: skip
