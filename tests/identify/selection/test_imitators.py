@@ -110,8 +110,6 @@ def test_what_slips_does_not_become_the_spring_that_is_taken_out():
     assert turned(slips, kept.axis, dataset.training) == []
     assert kept.error > 3.0 * alone.error
     assert kept.axis["presliding_hysteresis"].fixed == slips["presliding_hysteresis"].fixed
-    both = having(slips, "spring", k1=1.0)
-    assert fit_themselves(both, dataset.training).error == fit_axis(both, dataset.training).error
 
 
 def test_a_mass_that_no_motion_told_is_nobodys_place():
