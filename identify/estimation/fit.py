@@ -23,7 +23,7 @@ from identify.estimation.spatial_periods import spatial_periods
 from identify.rules import RULE
 from twin.curve import Part
 from twin.effect import Kind
-from twin.model.machine import AxisModel
+from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 from twin.threads import trim_beside
@@ -202,14 +202,26 @@ def fit_axis(
 
 
 def turned(begun: AxisModel, axis: AxisModel, logs: Sequence[PreparedLog]) -> list[str]:
-    """Names of the laws that were themselves when a fit began, and are others as it ended."""
-    seen = covered(tuple(log.motion for log in logs))
-    first = {f.effect.name: f for f in begun.effects}
+    """Names of the laws that were themselves when a fit began, and are others as it ended.
+
+    One of which hardly anything is left is none.
+    """
+    seen, first = (
+        covered(tuple(log.motion for log in logs)),
+        {f.effect.name: f for f in begun.effects},
+    )
+
+    def is_left(now: Fitted, was: Fitted) -> bool:
+        pairs = [(now.values[p.name], was.values[p.name]) for p in now.effect.strengths]
+        return any(abs(after) > RULE.collapse * abs(before) for after, before in pairs)
+
     both = [(f, first[f.effect.name]) for f in axis.effects if f.effect.name in first]
     return [
         now.effect.name
         for now, was in both
-        if now.effect.imitation(now.values, seen) and not was.effect.imitation(was.values, seen)
+        if now.effect.imitation(now.values, seen)
+        and not was.effect.imitation(was.values, seen)
+        and is_left(now, was)
     ]
 
 

@@ -127,7 +127,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
-        if imitation := _imitation(fitted, ended, dataset.excitation):
+        if imitation := imitation_of(fitted, ended, dataset.excitation):
             return _told_as(imitation, fit.axis)
         if ended:
             return f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound"
@@ -144,7 +144,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     return None
 
 
-def _imitation(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:
+def imitation_of(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:
     """What a law is where it is not itself; ended: labels of what a fit held where it still is."""
     effect, values = fitted.effect, fitted.values
     names = [label.split(".")[-1] for label in ended]
@@ -158,7 +158,7 @@ def _imitation(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imi
 def _told_as(imitation: Imitation, axis: AxisModel) -> str:
     """What an effect of an axis is where it is not itself, in words."""
     knee, unit = imitation.knee, axis.units(imitation.knee.unit)
-    size, edge = (f"{v:.3g} {unit}" for v in (imitation.size, imitation.edge))
+    size, edge = (f"{v:.3g} {unit}".removesuffix(" 1") for v in (imitation.size, imitation.edge))
     side = "below" if imitation.size < imitation.edge else "beyond"
     value = "" if size == edge else f" of {size}"
     return f"its {knee.name}{value} is {side} {edge}, so that it is {imitation.of.value} here"

@@ -24,6 +24,7 @@ from identify.estimation.free_curves import Shape, columns_of, shapes_of, sticki
 from identify.estimation.variable_projection import Start, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, part_of
+from identify.selection.candidates import imitation_of
 from identify.selection.controls import ControlTest, change_of, with_unit_penalty
 from identify.selection.nonparametric import fit_in_place
 from twin.effect import Effect, Kind
@@ -254,7 +255,8 @@ def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:
 
     Strengths that ended at a bound belong to another law; it is fitted without them.
     """
-    return in_simplest_values(_held_inside(_less_at_bounds(fit, judged, effect), effect), effect)
+    inside = _held_inside(_less_at_bounds(fit, judged, effect), judged, effect)
+    return in_simplest_values(inside, effect)
 
 
 def in_simplest_values(fit: Fit, effect: Effect) -> Fit:
@@ -282,15 +284,16 @@ def _less_at_bounds(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     return again if before - then > RULE.promise * (before - first) else fit
 
 
-def _held_inside(fit: Fit, effect: Effect) -> Fit:
+def _held_inside(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     """The fit with what ended at a bound held half way to it, where that explains as much.
 
     Of two values of which the logs tell a ratio alone, as the load and the stiffness of a mode
-    beyond what they reach, one ends anywhere: its bound tells nothing against the effect.
+    beyond what they reach, one ends anywhere: its bound tells nothing against the effect, but where
+    it is another law beyond.
     """
     fitted, ended = fit.axis[effect.name], at_bounds(fit, effect.name)
     names = [label.split(".")[-1] for label in ended]
-    if not names:
+    if not names or imitation_of(fitted, ended, judged.dataset.excitation):
         return fit
     half = {n: 0.5 * (effect.parameter(n).start + fitted.values[n]) for n in names}
     values, fixed = {**fitted.values, **half}, fitted.fixed.union(names)

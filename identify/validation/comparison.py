@@ -101,17 +101,14 @@ def compare_axis(
     kept = moving(logs, sticks(axis))
     every = residual(axis, logs)
     force = every[kept]
-    by_log = split_by_log(np.where(kept, every, np.nan), logs)
     if floor is None:
         floor = known_floor(axis, logs, np.where(kept, every, 0.0))
+    by_log = zip(logs, split_by_log(every, logs), split_by_log(kept, logs), strict=True)
     where = {k: v[kept] for k, v in coordinates(axis, logs).items()}
     maps = [*misfit_maps(axis, logs, floor, force, where), misfit_by_frequency(axis, logs)]
     return AxisComparison(
         axis=dataset.axis,
-        force_error={
-            log.motion.name: rms(left[~np.isnan(left)])
-            for log, left in zip(logs, by_log, strict=True)
-        },
+        force_error={log.motion.name: rms(left[own]) for log, left, own in by_log},
         floor=floor,
         position_error=position_error,
         position_floor=position_floor,

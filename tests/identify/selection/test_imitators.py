@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from planted_logs import FIRST, HARDWARE, RATE, SLIDE, Ride, asked, begun, few, having, logged
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Fit
+from identify.estimation.fit import Fit, fit_axis, fit_themselves, turned
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel
@@ -99,3 +99,23 @@ def test_no_refit_lets_an_actuation_take_the_command(law, values):
     assert driven.error > 0.75 * without.error
     own = driven.axis[law]
     assert own.effect.imitation(own.values, dataset.excitation) is None
+
+
+def test_what_slips_does_not_become_the_spring_that_is_taken_out():
+    """So that a refit without the spring had been as good, and the spring was dropped."""
+    slips = having(SLIDE, "presliding_hysteresis", reach=0.045, f0=0.2)
+    _, dataset = fitted(SLIDE, having(SLIDE, "spring", k1=6.0))
+    alone, kept = (fit(slips, dataset.training) for fit in (fit_axis, fit_themselves))
+    assert turned(slips, alone.axis, dataset.training) == ["presliding_hysteresis"]
+    assert turned(slips, kept.axis, dataset.training) == []
+    assert kept.error > 3.0 * alone.error
+    assert kept.axis["presliding_hysteresis"].fixed == slips["presliding_hysteresis"].fixed
+
+
+def test_a_mass_that_no_motion_told_is_nobodys_place():
+    """The base of a light axis took its friction for inertia, and the friction was refused."""
+    true = replace(SLIDE, mass=0.02)
+    base, dataset = fitted(replace(BARE, mass=1.0), true)
+    found = try_effect(base, dataset, CATALOGUE["coulomb_viscous"])
+    assert base.axis.mass > 3.0 * found.fit.axis.mass
+    assert found.refused is None
