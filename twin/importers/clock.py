@@ -100,8 +100,8 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     counters = [name for name, column in columns.items() if counts(name, column)]
     called, even = _candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])
-    rate = stated.rate if stated is not None else None
-    found = called or _agreeing(even, rate, [*columns], counters)
+    rated = stated.rate if stated is not None else None
+    found = called or _agreeing(even, rated, [*columns], counters)
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
     if found:
