@@ -111,8 +111,7 @@ class Finding:
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
     that curve, where it has such a parameter. left, left_fitted: over the noise floor, the error
     that all findings together leave on the logs that chose, and on the training logs. doubt: why
-    its values cannot be its own, in words; None where they can. quiet: whether what is left without
-    it is noise.
+    its values cannot be its own, in words; None where they can.
     """
 
     effect: str
@@ -130,7 +129,6 @@ class Finding:
     left: float = 1.0
     left_fitted: float = 1.0
     doubt: str | None = None
-    quiet: bool = False
     parameter_units: dict[str, str] = field(default_factory=dict)
     equation: str = ""
 
@@ -148,8 +146,7 @@ class Finding:
 
         It was chosen of many before; here it is asked alone.
         """
-        no = "what is left without it is noise" if self.quiet else None
-        return self.doubt or no or replace(self.score, among=1).refused
+        return self.doubt or replace(self.score, among=1).refused
 
     @property
     def is_sure(self) -> bool:
@@ -250,7 +247,6 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
         together=tuple(others) if any(s.with_others for s in steps) else (),
         doubt=None if alone else _doubt(steps[0].change, less, final),
-        quiet=less.at_floor and not alone,
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)

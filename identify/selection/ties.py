@@ -14,7 +14,7 @@ from dataclasses import replace
 from identify.estimation.fit import fit_axis, fit_roughly
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
-from identify.selection.candidates import candidate_of
+from identify.selection.candidates import candidate_of, doubt
 from identify.selection.changes import Added, Screening
 from identify.selection.search import Found, Step, is_tied, simplest
 from identify.selection.trying import Tried, fitted_anew, parameters, refitted_on
@@ -44,13 +44,16 @@ def _compared_again(step: Step, found: Found) -> Found:
     rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
     fitted = (_in_its_place(t, own, without, found) for t in rivals.values())
     tied = [t for t in fitted if t is not None]
-    # Another shape of a law was fitted beside what the search had then, and cannot lead.
-    leader = simplest([own, *(t for t in tied if isinstance(t.change, Added))])
-    others = tuple(t for t in (own, *tied) if t is not leader)
+    # Another shape of a law was fitted beside what the search had then, and cannot lead; nor does
+    # what was found where its values cannot be its own and those of a rival can.
+    leading = [t for t in tied if isinstance(t.change, Added)]
+    is_own = not doubt(without, final.fit, own.change.effect, parameters(own.change))
+    leader = simplest([own, *leading] if is_own or not leading else leading)
+    others = tuple(t for t in ((own, *tied) if is_own else tied) if t is not leader)
     if leader is own:
         return _with_step(found, step, replace(step, tied=others), final)
-    leading = replace(leader, judged=fitted_anew(leader.judged))
-    return _with_step(found, step, replace(step, tried=leading, tied=others), leading.judged)
+    leader = replace(leader, judged=fitted_anew(leader.judged))
+    return _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
 
 
 def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:
