@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, replace
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import fit_aligned, realigned
-from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished
 from identify.estimation.residual_noise import with_own_noise
+from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.findings import Confirmation, Finding, findings_of, without_law
 from identify.selection.search import Found, on_final_dataset, resumed, search
@@ -86,8 +86,7 @@ def _at_its_best(found: Found) -> Found:
     final, dataset, fit = found.final, found.dataset, found.final.fit
     for _ in range(2 if dataset.channel_delay else 1):
         dataset, fit = fit_aligned(fit.axis, realigned(dataset, 0.0))
-    least = 1.0 / BETTER if found.dataset.channel_delay else BETTER
-    if not fit.error < least * final.fit.error:
+    if RULE.fallen * fit.error > final.fit.error:
         return found
     better = Judged(replace(fit, begun=final.fit.begun), dataset)
     return on_final_dataset(better, replace(found, dataset=dataset, final=better))
