@@ -18,9 +18,9 @@ from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
     Given,
+    apart,
     moving_in,
     nothing_moves,
-    require_apart,
     require_one_kind,
     require_samples,
 )
@@ -60,12 +60,12 @@ def _prepared(
     model: MachineModel, parts: Sequence[Mapping[str, Log]], test_function: float | None
 ) -> dict[str, Dataset]:
     """The datasets of ``datasets``; parts: the logs of each role."""
-    given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # each is read once
+    given: Given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # read once
     training = given[Role.TRAINING].values()
     require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
     for logs in given.values():
         require_samples(logs)
-    require_apart(given)
+    given, copied = apart(given)
     bodies = {n: bodies_along(model, log, n) for logs in given.values() for n, log in logs.items()}
     out: dict[str, Dataset] = {}
     for name, axis in model.axes.items():
@@ -75,7 +75,7 @@ def _prepared(
         going = {role: moving for role, (moving, _) in found.items()}
         if going[Role.TRAINING]:
             why = f"axis {name} stands still in it; give one in which it moves"
-            still = {log: why for _, names in found.values() for log in names}
+            still = copied | {log: why for _, names in found.values() for log in names}
             own = {log: along[name] for log, along in bodies.items() if name in along}
             out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=still)
             out[name].forget()  # the next axis needs the memory

@@ -49,7 +49,7 @@ class FitResult(Printed):
 
     @property
     def left_out(self) -> Mapping[str, tuple[str, ...]]:
-        """By axis, the logs in which it stands still, and which were left out of its fit."""
+        """By axis, the logs that tell nothing new of it, and were left out of its fit."""
         return {axis: dataset.still for axis, dataset in self.datasets.items()}
 
     @property

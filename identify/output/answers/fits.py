@@ -67,7 +67,7 @@ class FitEntry(Entry):
     test_force_error: Number
     unit: str = read("axis.units.force")
     left_out: list[str] = read("still")
-    """Logs in which the axis stands still."""
+    """Logs that tell nothing new of the axis: it stands still, or they are copies of another."""
     force_noise: Number
     """Force that no sensor makes and nothing measured predicts, RMS."""
     force_shift: Number = read("channel_delay")

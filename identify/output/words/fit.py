@@ -83,7 +83,7 @@ def fit_in_words(result: FitResult, axis: str) -> Iterator[str]:
     yield from (f"at its bound: {label}" for label in fit.at_bound)
     yield from prepared_in_words(result.datasets[axis])
     if still:
-        yield f"not fitted on {', '.join(still)}, where axis {axis} stands still"
+        yield f"not fitted on {', '.join(still)}, which tell nothing new of axis {axis}"
     if changed := refit_in_words(result.refits[axis]):
         yield changed
     if common := common_reason(result.estimates[axis]):
