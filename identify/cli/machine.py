@@ -179,15 +179,15 @@ def info(
 
 @app.command()
 def check(logs: Logs) -> Said:
-    """Say whether logs are fit for identification, and what is wrong with them.
+    """Say whether logs are fit for identification, what is wrong with them, and which are copies.
 
     Example: twin check run.mcap
     """
     from identify.output.answers.machine import check_answer
     from identify.output.machine import check_text
-    from twin.checks.long import check_file
+    from twin.checks.long import check_files
 
-    reports = {str(path): check_file(path) for path in logs}
+    reports = check_files(logs)
     answer = check_answer(reports)
     return Said(check_text(reports), answer, fine=answer.ok)
 

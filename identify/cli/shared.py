@@ -202,7 +202,7 @@ def with_logs(
     rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, left_out() as silent:
         result = job(model, recorded, *rest, progress=progress)
-    return Done(result, recorded.findings, silent)
+    return Done(result, recorded.findings, list(dict.fromkeys(silent)))  # of all axes alike
 
 
 @contextmanager

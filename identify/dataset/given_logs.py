@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import logging
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -10,38 +11,58 @@ import numpy as np
 from identify.dataset.dataset import Role
 from identify.dataset.motion import SHORTEST_LOG, other_axes, shortest_log
 from twin.checks import moves
+from twin.checks.copies import copies
 from twin.errors import InputError
-from twin.logs import AxisLog, Log
+from twin.logs import Log
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
 
-WINDOWS = 8  # of the shorter of two logs, evenly spaced, that are sought in the longer one
+LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 READ_IF_LOGGED = ("velocity", "setpoint_position")
-BUSY = {Role.TRAINING: "is fitted", Role.SELECTION: "chooses effects"}
 
 
-def require_apart(given: Given) -> None:
-    """Raise InputError where a log that is to test a fit has samples that took part in it.
+def apart(given: Given) -> tuple[Given, dict[str, str]]:
+    """The logs less those that are copies of another of their role, and why these are left out.
 
-    Also where two of different roles have one name, by which each is told from then on.
+    Fitted or tested on twice, a recording would count as two. Of logs of one role that share a part
+    each has something of its own: both stay, and it is told. Raises InputError where logs of two
+    roles are one recording, or share a part, as it cannot test what it decided; and where they have
+    one name, by which each is told from then on.
     """
+    _require_names(given)
+    roles = {name: role for role, logs in given.items() for name in logs}
+    left_out: dict[str, str] = {}
+    for copy in copies({name: log for logs in given.values() for name, log in logs.items()}):
+        names = sorted((copy.original, copy.copy), key=lambda name: [*Role].index(roles[name]))
+        busy, free = (roles[name] for name in names)
+        if busy is not free:
+            tester = "it" if names[1] == copy.copy else names[1]
+            raise InputError(
+                f"{copy.copy} is {copy}: as a {free.value} log {tester} proves nothing; give "
+                "another recording"
+            )
+        if copy.is_complete:
+            left_out[copy.copy] = f"it is {copy}, and would count twice"
+        else:
+            LOGGER.warning("%s: is %s, which counts twice; cut it off", copy.copy, copy)
+    kept = {
+        role: {name: log for name, log in logs.items() if name not in left_out}
+        for role, logs in given.items()
+    }
+    return kept, left_out
+
+
+def _require_names(given: Given) -> None:
+    """Raise InputError where two logs of different roles have one name."""
     for busy, free in combinations(Role, 2):
         for name in given[busy].keys() & given[free].keys():
             raise InputError(
                 f"{name}: the name of a {busy.value} log and of a {free.value} log; give each log "
                 "one role, and a name of its own"
             )
-        for held, other in given[free].items():
-            for name, log in given[busy].items():
-                if share_samples(log, other):
-                    what = "held out" if free is Role.SELECTION else "a test log"
-                    raise InputError(
-                        f"{held}: {what}, but has samples of {name}, which {BUSY[busy]}, "
-                        "and so cannot test the fit; give a log of another experiment"
-                    )
 
 
 def require_samples(logs: Mapping[str, Log]) -> None:
@@ -157,67 +178,3 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
             f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
             f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
         )
-
-
-def share_samples(one: Log, other: Log) -> bool:
-    """Whether a stretch of one log, in which an axis moves, is in the other sample by sample.
-
-    Be it at another place in each. Of distinct runs not even the same program and a coarse encoder
-    give the same readings and commands for long while an axis moves. At rest they may, so that
-    windows with motion are compared. A log of an axis at rest, with the noise of its encoder, is
-    not used for that axis.
-    """
-    shorter, longer = sorted((one, other), key=len)
-    return any(
-        _share(shorter.axes[axis], longer.axes[axis]) and moves(shorter, axis)
-        for axis in shorter.axes
-        if axis in longer.axes
-    )
-
-
-def _share(shorter: AxisLog, longer: AxisLog) -> bool:
-    """The same of one axis."""
-    both = shorter.columns.keys() & longer.columns.keys()
-    command = next((name for name in ("force", "current") if name in both), None)
-    if command is None:
-        return False
-    sought, given = ((signals.position, signals.columns[command]) for signals in (shorter, longer))
-    return any(
-        _is_in((sought[0][window], sought[1][window]), moving - window.start, given)
-        for window, moving in _with_motion(shorter.position)
-    )
-
-
-def _with_motion(position: Array) -> Iterator[tuple[slice, int]]:
-    """Windows of positions (n,) m in which the axis moves, and a sample of each at which it does.
-
-    They are as long as the motion asks for, but a part of the log at least.
-    """
-    span, least = float(np.ptp(position)), len(position) // WINDOWS
-    if not 0.0 < span < np.inf:
-        return
-    # 1000 cells, into which the range of positions is divided
-    entered = np.flatnonzero(np.diff(np.floor(position * (1000.0 / span)))) + 1
-    starts = np.linspace(0, len(position) - least, WINDOWS).astype(int)
-    ends = np.searchsorted(entered, starts) + 32 - 1  # of which so many are entered within a window
-    for start, end in zip(starts, ends, strict=True):
-        if end < len(entered):
-            moving = int(entered[end])
-            yield slice(int(start), max(int(start) + least, moving + 1)), moving
-
-
-def _is_in(window: tuple[Array, Array], moving: int, signals: tuple[Array, Array]) -> bool:
-    """Whether position and command of a window are somewhere in longer signals.
-
-    moving: number of a sample at which it moves, which so is at few places of the signals.
-    """
-    n = len(window[0])
-    begins = np.flatnonzero(signals[0] == window[0][moving]) - moving
-    begins = begins[(begins >= 0) & (begins + n <= len(signals[0]))]
-    for k in (moving, *np.linspace(0, n - 1, WINDOWS).astype(int)):  # before all are compared
-        for values, wanted in zip(signals, window, strict=True):
-            begins = begins[values[begins + k] == wanted[k]]
-    return any(
-        all(np.array_equal(s[b : b + n], w) for s, w in zip(signals, window, strict=True))
-        for b in begins
-    )

@@ -18,9 +18,9 @@ from identify.dataset.coordinates import excitation
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
     Given,
+    apart,
     is_driven,
     nothing_told,
-    require_apart,
     require_one_kind,
     require_samples,
     telling_in,
@@ -65,12 +65,12 @@ def _prepared(
     model: MachineModel, parts: Sequence[Mapping[str, Log]], test_function: float | None
 ) -> dict[str, Dataset]:
     """The datasets of ``datasets``; parts: the logs of each role."""
-    given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # each is read once
+    given: Given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # read once
     training = given[Role.TRAINING].values()
     require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))
     for logs in given.values():
         require_samples(logs)
-    require_apart(given)
+    given, copied = apart(given)
     bodies = {n: bodies_along(model, log, n) for logs in given.values() for n, log in logs.items()}
     out: dict[str, Dataset] = {}
     unused: list[dict[str, str]] = []
@@ -82,6 +82,7 @@ def _prepared(
         going = {role: telling for role, (telling, _) in found.items()}
         if going[Role.TRAINING]:
             silent = {log: why for _, reasons in found.values() for log, why in reasons.items()}
+            silent = {**copied, **silent}
             own = {log: along[name] for log, along in bodies.items() if name in along}
             out[name] = replace(_of_axis(model, name, going, test_function, own), left_out=silent)
             out[name].forget()  # the next axis needs the memory

@@ -56,7 +56,7 @@ class FitResult(Printed):
 
     @property
     def left_out(self) -> Mapping[str, Mapping[str, str]]:
-        """By axis, the logs that say nothing of it, with why."""
+        """By axis, the logs that say nothing new of it, with why."""
         return {axis: dataset.left_out for axis, dataset in self.datasets.items()}
 
     @property

@@ -111,8 +111,8 @@ def test_logs_are_prepared_alike_in_each_role():
 @pytest.mark.parametrize(
     ("logs", "held", "test", "why"),
     [
-        ({"a": TEST["c"]}, HELD, TEST, "c: a test log, but has samples of a, which is fitted"),
-        (LOGS, {"b": TEST["c"]}, TEST, "c: a test log, but has samples of b, which chooses"),
+        ({"a": TEST["c"]}, HELD, TEST, "c is a copy of a: as a test log it proves nothing"),
+        (LOGS, {"b": TEST["c"]}, TEST, "c is a copy of b: as a test log it proves nothing"),
         # Not even of another recording: what is told of a log, such as its beginning, is by name.
         (LOGS, {"a": HELD["b"]}, {}, "a: the name of a training log and of a selection log; give"),
         (LOGS, {}, {"a": TEST["c"]}, "a: the name of a training log and of a test log; give each"),

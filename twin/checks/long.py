@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.checks import check_log
+from twin.checks.copies import COMPARED, Copy, copies
 from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
 from twin.logs.decode import read_parts, require_intact, samples_by_axis
 from twin.logs.log import Log, in_multiples, joined, thinned
@@ -67,6 +68,29 @@ def check_file(path: Path) -> CheckReport:
         pass
     require_intact(path)
     return together(reports)
+
+
+def check_files(paths: Sequence[Path]) -> dict[str, CheckReport]:
+    """``check_file`` of each by its name, and which logs are copies of another. Raises InputError.
+
+    Of each only what is compared is held; of logs too long for that fewer samples, as for a fit.
+    """
+    if len(paths) == 1:
+        return {str(path): check_file(path) for path in paths}
+    every = step_of(paths)
+    logs, reports = {}, {}
+    for path in paths:
+        logs[str(path)], reports[str(path)] = read_checked(path, COMPARED, every)
+        require_intact(path)
+    for copy in copies(logs):
+        report = reports[copy.copy]
+        reports[copy.copy] = replace(report, findings=(*report.findings, _told(copy)))
+    return reports
+
+
+def _told(copy: Copy) -> LogFinding:
+    remedy = "it proves nothing of a fit to that, and fitted beside it counts twice: leave it out"
+    return LogFinding(Severity.ERROR, Fault.COPY, copy.axis, str(copy), WHOLE, remedy)
 
 
 def read_checked(path: Path, fields: Sequence[str], every: int = 1) -> tuple[Log, CheckReport]:

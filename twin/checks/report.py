@@ -40,6 +40,7 @@ class Fault(Enum):
     SATURATION = "the command is limited"
     COARSE_POSITION = "the position is too coarse"
     WEAK_EXCITATION = "the motion excites too little"
+    COPY = "the log is a copy of another"
 
 
 @dataclass(frozen=True)

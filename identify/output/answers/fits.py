@@ -67,7 +67,7 @@ class FitEntry(Entry):
     test_force_error: Number
     unit: str = read("axis.units.force")
     left_out: list[str]
-    """Logs that say nothing of the axis."""
+    """Logs that say nothing new of the axis: nothing at all, or they are copies of another."""
     force_noise: Number
     """Force that no sensor makes and nothing measured predicts, RMS."""
     force_shift: Number = read("channel_delay")
