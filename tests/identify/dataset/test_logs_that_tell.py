@@ -157,9 +157,10 @@ def test_a_log_that_is_too_short_is_left_out_of_any_role(caplog, role):
 
 
 def turned(rate: float, begun: float, units) -> Log:
-    """An axis that goes ahead at a mean rate and swings about it, from a place on."""
-    place = begun + rate * T + 0.4 * np.sin(5.0 * T)
-    force = np.sign(rate + 2.0 * np.cos(5.0 * T)) - 10.0 * np.sin(5.0 * T)
+    """An axis that goes ahead at a mean rate and swings about it, from a place on; with noise."""
+    noise = np.random.default_rng(round(1e3 * begun)).standard_normal((2, len(T)))
+    place = begun + rate * T + 0.4 * np.sin(5.0 * T) + 1e-6 * noise[0]
+    force = np.sign(rate + 2.0 * np.cos(5.0 * T)) - 10.0 * np.sin(5.0 * T) + 1e-3 * noise[1]
     return Log(RATE, {"x": AxisLog({"position": place, "force": force}, units)})
 
 

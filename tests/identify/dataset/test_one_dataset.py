@@ -288,7 +288,14 @@ def silent_still() -> Log:
 
 
 def elsewhere(part: float) -> Log:
-    return drive(change=lambda c: c.update(position=c["position"] + part))
+    """A run of its own, as its noise tells."""
+
+    def change(columns: dict) -> None:
+        noise = np.random.default_rng(round(1e6 * part)).standard_normal((2, len(columns["force"])))
+        columns["position"] = columns["position"] + part + 1e-7 * noise[0]
+        columns["force"] = columns["force"] + 1e-3 * noise[1]
+
+    return drive(change=change)
 
 
 MOVING = {"run": drive()}
