@@ -7,13 +7,17 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.figures import Figure, Target
+from benchmarks.second_simulator.servo_axes import MOTIONS, drawn
 from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
 from identify.frequency.plant import plant_of
 from identify.frequency.response import response
+from identify.workflow import frequency_response
+from twin.errors import InputError
 from twin.signals import Array
 
 TITLE = "Frequency response of two masses on a spring, 1 kHz, 16 s, over 100 draws"
 DRAWS, SAMPLES = 100, 16_000
+MACHINES, SEED = 30, 48  # drives with friction, cogging, encoders and loops of their own
 
 
 def measure() -> list[Figure]:
@@ -32,7 +36,34 @@ def measure() -> list[Figure]:
             Figure(f"{name}: delay, largest error", float(delay.max()), "samples",
                    Target(high=0.02)),
         ]  # fmt: skip
-    return out
+    return [*out, *_of_drives()]
+
+
+def _of_drives() -> list[Figure]:
+    """Resonances told of drives that have none, and of drives that have one."""
+    false = sum(bool(_told(seed, resonant=False)) for seed in range(MACHINES))
+    off = [x for seed in range(MACHINES) for x in _told(seed, resonant=True)]
+    wrong = sum(x > 0.01 for x in off)
+    return [
+        Figure("drives without a resonance: of these one is told", false / MACHINES, "1",
+               Target(high=0.0), f"{false} of {MACHINES}"),
+        Figure("drives with one: told, but off by more than 1 %", wrong / max(len(off), 1), "1",
+               Target(high=0.0), f"{wrong} of {len(off)} told, over {MACHINES} drives"),
+    ]  # fmt: skip
+
+
+def _told(seed: int, *, resonant: bool) -> list[float]:
+    """By how much each resonance that is told of a drive is off its own; 1 where it has none."""
+    rng = np.random.default_rng([SEED, seed, int(resonant)])
+    axis = drawn(rng, resonant, list(MOTIONS)[seed % len(MOTIONS)])
+    logs = {f"log {i}": axis.log(rng) for i in range(int(rng.integers(1, 4)))}
+    try:
+        plant = frequency_response(logs).axes["q"].measured.plant
+    except InputError:  # the logs tell no response
+        return []
+    modes = plant.modes if plant else ()
+    own = np.inf if axis.resonance is None else axis.resonance[0]
+    return [min(abs(mode.frequency.value / own - 1.0), 1.0) for mode in modes]
 
 
 def _draw(

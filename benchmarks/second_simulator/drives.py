@@ -30,7 +30,8 @@ class Plant(NamedTuple):
     slip: Stribeck speed. stiffness: of presliding. hysteresis: N of a second, softer friction.
     asymmetry, modulation: parts of the friction. cogging, second: N, at pitch and other. weight: N
     times the sine of the position. ripple: part of the force. lag: s. load, coupling, loss: kg, N/m
-    and N s/m of a mass on a spring.
+    and N s/m of a mass on a spring. far: part of the load's place in the logged reading. delay: s,
+    of the command.
     """
 
     mass: float
@@ -53,6 +54,8 @@ class Plant(NamedTuple):
     load: float = 0.0
     coupling: float = 0.0
     loss: float = 0.0
+    far: float = 0.0
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -148,6 +151,7 @@ def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  
     """Readings and commands as logged, a sample each so many steps; semi-implicit Euler steps."""
     p, dt = plant, 1.0 / STEP
     read, command = np.zeros((2, len(path) // each))
+    sent, late = np.zeros(len(path)), round(p.delay / dt)
     x, v, z, h, at, rate, seen, last, whole = (
         path[0],
         0.0,
@@ -168,9 +172,12 @@ def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  
             error = gains[0] * (path[i] - reading) + speed[i] - seen
             whole += error * control * dt
             asked = gains[1] * error + gains[2] * whole + pushed[i]
-        given += (asked - given) * (1.0 if p.lag == 0.0 else dt / p.lag)
+        sent[i] = asked
+        then = sent[max(i - late, 0)]
+        given += (then - given) * (1.0 if p.lag == 0.0 else dt / p.lag)
         if i % each == 0:
-            read[i // each] = encoder * np.round(x / encoder)
+            place = x + p.far * (at - x)
+            read[i // each] = encoder * np.round(place / encoder)
             command[i // each] = asked
         total += asked
         if (i + 1) % each == 0:

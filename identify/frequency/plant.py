@@ -24,6 +24,7 @@ from twin.errors import InputError
 from twin.signals import Array
 
 SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
+LOUD = 3.0  # standard deviations from which an error counts less: what is not linear has peaks
 DAMPING = (1e-4, 0.005, 0.05, 0.3)  # of a mode: least, two at which it is sought, and most
 
 
@@ -80,10 +81,7 @@ def plant_of(found: Response, most: int = 4) -> Plant:
     told = replace(told, spread=np.hypot(told.spread, nearest * np.abs(told.plant)))
     best = _best_from(told, _without_modes(told))
     for _ in range(most):
-        better = _best_from(told, _with_mode(told, best))
-        # Twice the fall of the cost is that of a log likelihood; three values more.
-        if best.cost - better.cost < 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic:
-            break
+        better = _best_from(told, _with_mode(_roughly(told), best))
         if not all(_is_seen(mode, told) for mode in better.modes):
             break
         best = better
@@ -93,12 +91,15 @@ def plant_of(found: Response, most: int = 4) -> Plant:
 def _is_seen(mode: Mode, told: Response) -> bool:
     """Whether a mode is surely there, and both its sides are among the frequencies told.
 
-    What is as damped as one may be is none: it has no peak.
+    Its gain is, by Schwarz's criterion for three values more. What may be as damped as one can be
+    is none: it has no peak.
     """
     low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
     first, last = told.frequency[[0, -1]] / mode.frequency.value
-    peaks = mode.damping.band < mode.damping.value < 0.99 * DAMPING[-1]
-    return bool(peaks and abs(mode.gain.value) > mode.gain.band and first < low and high < last)
+    peaks = mode.damping.value + mode.damping.band < 0.99 * DAMPING[-1]
+    evidence = (SURE * mode.gain.value / mode.gain.band) ** 2
+    sure = evidence > 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic
+    return bool(peaks and sure and first < low and high < last)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +133,39 @@ class _Solved:
         return tuple(sorted(modes, key=lambda m: m.frequency.value))
 
 
+def _covariance(jac: Array, error: Array) -> Array:
+    """Covariance (n, n) of values by the robust loss's Jacobian (2 k, n) and what is left (2 k,).
+
+    What is left of a machine that is not linear is alike at near frequencies, and a smooth shape
+    meets more of it than a narrow one: the sandwich of W. K. Newey, K. D. West, A Simple, Positive
+    Semi-Definite, Heteroskedasticity and Autocorrelation Consistent Covariance Matrix, Econometrica
+    55, 1987, with the correlations up to where they end, of no less than noise.
+    """
+    from scipy.linalg import toeplitz
+
+    weight = 1.0 + (error / LOUD) ** 2
+    plain = (jac.T * weight**0.75).reshape(len(jac.T), 2, -1)
+    left = (error / np.sqrt(weight)).reshape(2, -1)
+    k = left.shape[1]
+    alike = np.array([np.sum(left[:, lag:] * left[:, : k - lag]) for lag in range(k)])
+    ends = int(np.argmax(alike <= 0.0)) or k
+    alike[:ends] *= 1.0 - np.arange(ends) / ends
+    alike[ends:] = 0.0
+    level = max(alike[0] / max(2 * k - len(plain), 1), 1.0) / alike[0]
+    meat = np.einsum("ipk,kl,jpl->ij", plain, level * toeplitz(alike), plain, optimize=True)
+    size, ways = np.linalg.eigh(jac.T @ jac)
+    bread = ways / np.maximum(size, 1e-3) @ ways.T  # a way that changes nothing is not told at all
+    return np.asarray(bread @ meat @ bread)
+
+
+def _roughly(told: Response) -> Response:
+    """The same, known to a tenth: what it is like as a whole is found first."""
+    return replace(told, spread=np.hypot(told.spread, 0.1 * np.abs(told.plant)))
+
+
 def _best_from(told: Response, starts: Sequence[Array]) -> _Solved:
-    return min((_solved(told, start) for start in starts), key=lambda s: s.cost)
+    rough = min((_solved(_roughly(told), start) for start in starts), key=lambda s: s.cost)
+    return _solved(told, rough.values)
 
 
 def _solved(told: Response, start: Array) -> _Solved:
@@ -148,16 +180,13 @@ def _solved(told: Response, start: Array) -> _Solved:
     omega = np.log(2.0 * np.pi * told.frequency[[0, -1]])
     low = [start[0] - 7.0, -20.0, -20.0, -100.0] + [omega[0], np.log(DAMPING[0]), -np.inf] * modes
     high = [start[0] + 7.0, 20.0, 40.0, 100.0] + [omega[1], np.log(DAMPING[-1]), np.inf] * modes
-    # A robust loss: what is not linear has peaks of its own.
     done = least_squares(
         left, np.clip(start, low, high), bounds=(low, high), x_scale="jac", loss="soft_l1",
-        f_scale=3.0, max_nfev=200,
+        f_scale=LOUD, max_nfev=200, ftol=1e-6, xtol=1e-6,
     )  # fmt: skip
-    square = done.jac.T @ done.jac
-    spread = max(2.0 * done.cost / max(len(done.fun) - len(start), 1), 1.0)
-    covariance = spread * np.linalg.pinv(square)
+    covariance = _covariance(done.jac, done.fun)
     # What ends at a bound is not told, nor what may change by a factor e and leaves all as it is.
-    untold = (done.active_mask != 0) | (square.diagonal() < 1.0)
+    untold = (done.active_mask != 0) | (np.sum(done.jac**2, axis=0) < 1.0)
     covariance[np.diag(untold)] = np.inf
     return _Solved(done.x, 2.0 * done.cost, covariance)
 
@@ -178,22 +207,28 @@ def _without_modes(told: Response) -> tuple[Array, Array]:
 
 
 def _with_mode(told: Response, best: _Solved) -> list[Array]:
-    """Values with one mode more, where a linear step finds that one takes most."""
-    left = -_left(best.values, told)
-    mass, late = float(np.exp(best.values[0])), best.values[3] * told.period
-    tried = []
-    for omega in 2.0 * np.pi * told.frequency[2:-2]:
-        for damping in DAMPING[1:-1]:
-            roots = _roots(2.0 * damping * omega, omega**2)
-            shape = _held(roots, 1.0 / mass, late, told) / told.spread
-            met = float(np.real(np.vdot(shape, left)))
-            gain = met / float(np.real(np.vdot(shape, shape)))
-            tried.append((gain * met, omega, damping, gain))
-    tried.sort(reverse=True)
-    first = tried[0]
-    apart = [one for one in tried if abs(np.log(one[1] / first[1])) > 0.1]
-    two = (first, *apart[:1])
-    return [np.array([*best.values, np.log(w), np.log(z), c]) for _, w, z, c in two]
+    """Values with one mode more, where that and the rest, each times a number, leave least.
+
+    Beside the values found, and beside a free mass: without the mode they may have had to bend.
+    """
+    starts = []
+    for values in (best.values, np.concatenate([_without_modes(told)[0], best.values[4:]])):
+        mass, late = float(np.exp(values[0])), values[3] * told.period
+        rest, aim = _sampled(values, told) / told.spread, told.plant / told.spread
+        tried = []
+        for omega in 2.0 * np.pi * told.frequency[2:-2]:
+            for damping in DAMPING[1:-1]:
+                roots = _roots(2.0 * damping * omega, omega**2)
+                both = np.stack([rest, _held(roots, 1.0 / mass, late, told) / told.spread])
+                met = (both.conj() @ aim).real
+                scale = np.linalg.lstsq((both.conj() @ both.T).real, met, rcond=None)[0]
+                if scale[0] > 0.0:
+                    tried.append((float(scale @ met), omega, damping, *scale))
+        if tried:
+            _, omega, damping, rest_times, gain = max(tried)
+            more = [np.log(omega), np.log(damping), gain / rest_times]
+            starts.append(np.array([values[0] - np.log(rest_times), *values[1:], *more]))
+    return starts
 
 
 def _left(values: Array, told: Response) -> Complex:
