@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency
 from identify.output.frequency import read_off
-from identify.output.numbers import NOTHING, pretty, quantity
+from identify.output.numbers import NOTHING, listed, pretty, quantity
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
 from identify.output.report.subject import AxisView
 from identify.results.frequency import by_source
@@ -16,15 +18,15 @@ def responses(view: AxisView) -> list[Block]:
     """Magnitude, phase, and what is read off them; nothing where the logs do not tell a mass."""
     response = view.subject.machine.response
     found = response.axes.get(view.name) if response else None
-    if found is None or found.measured.plant is None:
+    if response is None or found is None or found.measured.plant is None:
         return []
-    return [*_bode(found), _table(found)]
+    return [*_bode(found, response.logs), _table(found)]
 
 
-def _bode(found: AxisFrequency) -> list[Chart]:
+def _bode(found: AxisFrequency, logs: Sequence[str]) -> list[Chart]:
     """Magnitude and phase of each response, at the frequencies at which one tells something.
 
-    The model's is of the same frequencies as the measured one.
+    The model's is of the same frequencies as the measured one. logs: names of those that tell it.
     """
     shown = by_source(found)
     told = np.any([one.response.tells for one in shown.values()], axis=0)
@@ -38,8 +40,9 @@ def _bode(found: AxisFrequency) -> list[Chart]:
         sizes += [Drawn(label, 20.0 * np.log10(curve), line, ink) for label, curve, line in curves]
         phases.append(Drawn(name, np.degrees(np.angle(plant)) % -360.0, ink=ink))
     caption = (
-        "Force to position, as the best linear approximation with the setpoint as instrument. The "
-        "model is simulated on the same setpoint, so that friction lowers both alike."
+        f"Force to position, from {listed(logs)}, as twin frf tells it of the same logs: the best "
+        "linear approximation with the setpoint as instrument. The model is simulated on the same "
+        "setpoint, so that friction lowers both alike."
     )
     along = ("Frequency (Hz)", found.measured.response.frequency[told])
     level = f"Magnitude (dB of {pretty(found.units('m/N'))})"

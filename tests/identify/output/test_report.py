@@ -34,9 +34,9 @@ from identify.output.words.next_step import (
     gap_in_words,
     notes_in_words,
 )
-from identify.results.results import Addition
+from identify.results.results import Addition, OnMachine
 from identify.results.signals import Signals
-from identify.workflow import on_machine
+from identify.workflow import frequency_response, on_machine
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.file import in_short
@@ -88,6 +88,19 @@ def test_what_feedforward_gains_is_known_where_something_was_found(case: Case) -
     assert worth is not None
     assert worth.axes["x"].gains["cogging"] > 0.0
     assert on_machine(after, case.held).worth is None  # nothing was found: nothing is gained
+
+
+def test_the_response_of_the_page_is_that_of_the_command_and_says_of_which_logs(
+    case: Case, tmp_path: Path
+) -> None:
+    known = on_machine(case.diagnosis.model, case.fit).response
+    told = frequency_response(case.fit, case.diagnosis.model)
+    assert known is not None
+    one, other = (r.axes["x"].measured.response for r in (known, told))
+    np.testing.assert_array_equal(one.plant, other.plant)
+    np.testing.assert_array_equal(one.band, other.band)
+    page = case.write(tmp_path / "r.html", machine=OnMachine(response=known))
+    assert f"from {' and '.join(case.fit)}, as twin frf tells it" in Outline(page).text
 
 
 def test_the_footer_names_command_model_and_files_and_a_fault_comes_first(
