@@ -49,7 +49,7 @@ def moves(place: float) -> dict[str, Log]:
     return {
         f"{place} {speed}": simulate(
             ONE, Staircase("x", speeds=(speed,) * 2, span=0.01, longest_plateau=1e4, at=(place,)),
-            seed=1, simulator=ReducedSimulator,
+            seed=1 + (place > 0.0), simulator=ReducedSimulator,
         )
         for speed in (0.03, 0.06)
     }  # fmt: skip
@@ -264,6 +264,7 @@ def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
     with pytest.raises(InputError, match="two each way"):
         identify.cable_force(ALONE, {"log": log})
     apart = {f"{at}": simulate(ALONE, kinds.Staircase("x", speeds=(0.06,) * 2, span=0.01, at=(at,)),
-                               simulator=ReducedSimulator) for at in (0.102, -0.102)}  # fmt: skip
+                               seed=k, simulator=ReducedSimulator)
+             for k, at in enumerate((0.102, -0.102))}  # fmt: skip
     with pytest.raises(InputError, match="no stretch of the track in common"):
         identify.cable_force(ALONE, apart)
