@@ -113,8 +113,9 @@ def new(
 
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
-    read = dict(recorded)
-    model = first_model(read, out.stem, load_catalogue(), bodies, _masses(mass or ()))
+    read, known = dict(recorded), _masses(mass or ())
+    with recorded.explaining():
+        model = first_model(read, out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
