@@ -194,6 +194,29 @@ def check(logs: Logs) -> Said:
 
 
 @app.command()
+def cut(
+    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
+    out: Annotated[Path, written("MCAP log to write.")],
+    start: Annotated[float, Option("--from", help="Where it begins, s.")] = 0.0,
+    stop: Annotated[
+        float | None, Option("--to", help="Where it ends, s; the end of LOG if left out.")
+    ] = None,
+) -> Said:
+    """Write a stretch of a log as a log of its own.
+
+    Example: twin cut run.mcap --from 1.5 --to 12 -o good.mcap
+    """
+    from identify.output.answers.machine import LogAnswer
+    from twin.logs import cut_log, read_log, write_log
+
+    made = cut_log(read_log(log), start, stop)
+    write_log(made, out)
+    answer = LogAnswer.of(log=out, samples=len(made), sample_rate=made.sample_rate)
+    text = f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {made.metadata['cut']} of {log}"
+    return Said(text, answer)
+
+
+@app.command()
 def recover(
     log: Annotated[Path, Argument(metavar="LOG", help="Damaged MCAP log.")],
     out: Annotated[Path, written("MCAP log of what is intact.")],

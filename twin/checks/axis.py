@@ -240,14 +240,13 @@ class Axis:
 
     @property
     def pushed_back(self) -> bool:
-        """Whether force and acceleration are opposed in each part of the log that tells it.
+        """Whether force and acceleration are opposed in each third of the log that tells it.
 
         What the check does not know, such as a joint that another moves, may oppose them in all.
         """
-        parts = np.array_split(np.arange(len(self.force)), 3)  # of the log, of which two may agree
         fits = (
             fit_dynamics(self.force[p], self.regressors[p], self.kept[p], 0, self.rare)
-            for p in parts
+            for p in np.array_split(np.arange(len(self.force)), 3)
         )
         masses = [fit.mass for fit in fits if fit.mass is not None and fit.mass_matters]
         return max(masses, default=-1.0) < 0.0
