@@ -23,7 +23,7 @@ from identify.cli.shared import (
     was_kept,
     written,
 )
-from identify.output.machine import briefly
+from identify.output.machine import briefly, in_shell
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
 
@@ -129,7 +129,7 @@ def new(
         "no break away from rest takes more than Coulomb friction; it is set to that"
         for label, axes in having.items()
     ]
-    text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
+    text = f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, logs[0])}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]

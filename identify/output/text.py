@@ -40,6 +40,7 @@ from identify.output.words.next_step import (
     in_order,
     model_in_words,
     names_of,
+    next_step_in_words,
     question_in_words,
     supposed_in_words,
     wrong_body_in_words,
@@ -156,12 +157,12 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
             errors.append(_errors(d, tested.on, tested.before, tested.after))
         lines.append(f"axis {axis}: {said.verdict}{named}")
         lines += [f"  {units.words('force error')} {error}" for error in errors]
-        if axis in result.next_experiments:
-            lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         for first, *others in said.findings:
             lines += [f"  {first}", *(f"    {other}" for other in others)]
         rest = (said.beside, said.shapes, said.left, said.advice)
         lines += [f"  {sentence}" for sentences in rest for sentence in sentences]
+        if axis in result.next_experiments:
+            lines.append(f"  {next_step_in_words(result.next_experiments[axis])}")
         steps = source.still_to_do(said.commands, names_of(d.dataset))
         lines += [f"  next: {text}" for text in steps]
         lines += _candidates(d)
