@@ -99,6 +99,9 @@ def new(
             "where several move; it is held, and the rest is found beside it.",
         ),
     ] = None,
+    name: Annotated[
+        str | None, Option(help="Name of the machine; that of the file if left out.")
+    ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
 
@@ -115,7 +118,7 @@ def new(
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read, known = dict(recorded), _masses(mass or ())
     with recorded.explaining():
-        model = first_model(read, out.stem, load_catalogue(), bodies, known)
+        model = first_model(read, name or out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
-from identify.output.numbers import DisplayUnit, arrow, change, listed, number, quantity
+from identify.output.numbers import (
+    DisplayUnit,
+    arrow,
+    by_how_much,
+    change,
+    listed,
+    number,
+    quantity,
+)
 from identify.output.words.diagnosis import (
     all_found,
     named_in_words,
@@ -136,7 +144,8 @@ def _position_error(c: AxisComparison, log: str) -> str:
     if log not in c.position_error:
         return ""
     error = quantity(c.position_error[log], c.units.position)
-    return f", {c.units.words('free-running position error')} {error}"
+    fit = f" (fit {100.0 * c.position_fit[log]:.4g} %, NRMSE)"
+    return f", {c.units.words('free-running position error')} {error}{fit}"
 
 
 @text_of.register
@@ -288,7 +297,7 @@ def feedforward_text(result: Feedforward) -> str:
             for name, e in found.by_feedforward.items()
         ]
         lines += [
-            f"    with all but {e}: RMS {quantity(gain, unit)} larger"
+            f"    with all but {e}: RMS {by_how_much(gain, unit)}"
             for e, gain in found.gains.items()
         ]
         lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]
