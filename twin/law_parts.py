@@ -79,6 +79,15 @@ def bends_at(speed: str, as_: Imitated) -> Knee:
     return at(speed, "m/s", lambda e: (e.speed_least, e.speed_max), as_, as_)
 
 
+def turns_with_direction(as_: Imitated) -> Knee:
+    """Places passed both ways; where all are passed one way, what turns with it turns never."""
+    most = 0.5  # of the places: what most of them tell, the law has at the others
+    return Knee(
+        "share of places passed both ways", "1", lambda v, e: e.both_ways,
+        lambda v, e: (most, 1.0), below=as_,
+    )  # fmt: skip
+
+
 # --- friction -------------------------------------------------------------------------------------
 
 COULOMB_LEVEL = Parameter(

@@ -113,9 +113,19 @@ def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = No
         force_usual=float(np.median(driven[speed >= slow])),
         resolution=max(m.resolution for m in motions),
         shortest=max(_told(m) for m in motions),
+        both_ways=_both_ways(np.concatenate([m.position for m in motions]), velocity, fast),
         fewest_cycles=RULE.fewest_cycles,
         other_joints=_other_joints(motions[0]),
     )
+
+
+def _both_ways(position: Array, velocity: Array, fast: float) -> float:
+    """Of the places that were passed, the part that was passed both ways; fast: m/s, that count."""
+    places = 50  # along the track, as many as a smooth curve may tell apart
+    edges = np.linspace(position.min(), position.max(), places + 1)
+    ahead, behind = (np.histogram(position[way * velocity > fast], edges)[0] for way in (1.0, -1.0))
+    passed = (ahead > 0) | (behind > 0)
+    return float(np.sum((ahead > 0) & (behind > 0)) / max(np.sum(passed), 1))
 
 
 def _told(motion: Motion) -> float:

@@ -9,6 +9,8 @@ from math import cos, pi
 
 from twin.curve import Coordinate, Curve
 from twin.effect import DRY, LEAST, MOST, Effect, Kind, Parameter, X
+from twin.knee import Imitated
+from twin.law_parts import turns_with_direction
 
 
 def law(p, s, io):
@@ -44,6 +46,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
+    knees=(turns_with_direction(Imitated.OF_POSITION),),
     curves=(Curve(Coordinate.POSITION, by_direction=True, rubs=True),),
     fingerprint="residual flips with direction and has the same shape along the track",
     excited_by="constant-speed passes over the whole travel in both directions",
