@@ -17,9 +17,11 @@ It is plain Python and also compiles, once, to native code (see twin.core.native
 
 from __future__ import annotations
 
+import importlib
 import inspect
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -116,14 +118,18 @@ class Parameter:
     """Whether it is known by design: a fit holds it, unless the model file says otherwise."""
     at_least: str | None = None
     """Name of a parameter of the same effect that it may not fall below."""
-    start_rule: Callable[[Excitation], float] | None = None
+    start_rule: Callable[[Excitation], float] | None = field(default=None, compare=False)
     """A better start value, in ``unit``, from the motion of the logs."""
-    scan: Callable[[Excitation], Sequence[float]] | None = None
+    scan: Callable[[Excitation], Sequence[float]] | None = field(default=None, compare=False)
     """Values (k,), in ``unit``, that a diagnosis tries, from the motion of the logs."""
     period: bool = False
     """Whether it is a length (m) after which the force repeats along the track."""
     dry: bool = False
     """Whether it is a level (N) of dry friction."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the rules, which are asked for of the effect, and are functions."""
+        return {**self.__dict__, "start_rule": None, "scan": None}
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -239,6 +245,11 @@ class Effect:
                     f"effect {self.name}: its curve is bent by {bend}, which is no fixed parameter"
                 )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """An effect is its file, a number and a size; what is written are functions."""
+        count = next((int(p.start) for p in self.parameters if p.name == ELEMENTS), None)
+        return _again, (self.law.__module__, inspect.getfile(self.law), self.number, count)
+
     @cached_property
     def name(self) -> str:
         """The name of the file that holds the law, and from the second of several on its number."""
@@ -309,3 +320,15 @@ class Effect:
             p.name: p.start if excitation is None else p.start_from(excitation)
             for p in self.parameters
         }
+
+
+def _again(module: str, file: str, number: int, count: int | None) -> Effect:
+    """The effect of a file, as that one of several, of so many elements."""
+    if module in sys.modules or module.startswith("twin."):
+        effect: Effect = importlib.import_module(module).EFFECT
+    else:
+        from twin.effects import load_effect  # a user's file, which this process has not read
+
+        effect = load_effect(Path(file))
+    sized = effect if count is None or effect.of_size is None else effect.of_size(count)
+    return sized.numbered(number)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -68,6 +68,24 @@ def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
     return {k: np.concatenate([p[k] for p in parts]) for k in common}
 
 
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """What the motions of one axis cover together, found where it is asked for.
+
+    travel: m, of the axis where it is known.
+    """
+
+    motions: tuple[Motion, ...]
+    travel: tuple[float, float] | None
+
+    def __call__(self) -> Excitation:
+        return self._found
+
+    @cached_property
+    def _found(self) -> Excitation:
+        return excitation(self.motions, self.travel)
+
+
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
     """What the motions of one axis cover together; ``travel`` (m) of the axis where it is known."""
     heard = [m.head(ENOUGH / len(motions)) for m in motions]  # what repeats does so in them too
@@ -123,9 +141,9 @@ def _both_ways(position: Array, velocity: Array, fast: float) -> float:
     """Of the places that were passed, the part that was passed both ways; fast: m/s, that count."""
     places = 50  # along the track, as many as a smooth curve may tell apart
     edges = np.linspace(position.min(), position.max(), places + 1)
-    ahead, behind = (np.histogram(position[way * velocity > fast], edges)[0] for way in (1.0, -1.0))
-    passed = (ahead > 0) | (behind > 0)
-    return float(np.sum((ahead > 0) & (behind > 0)) / max(np.sum(passed), 1))
+    ways = [np.histogram(position[way * velocity > fast], edges)[0] > 0 for way in (1.0, -1.0)]
+    both, either = np.all(ways, axis=0).sum(), np.any(ways, axis=0).sum()
+    return float(both / max(either, 1))
 
 
 def _told(motion: Motion) -> float:

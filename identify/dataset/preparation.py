@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from identify.dataset.bodies import Bodies, bodies_along
-from identify.dataset.coordinates import excitation
+from identify.dataset.coordinates import Covered
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
     Given,
@@ -127,7 +127,7 @@ def _of_axis(
         training=tuple(spread(partial(PreparedLog.of, length=length), fit)),
         selection=_within_reach(held, length, fit),
         test=_within_reach(test, length, fit),
-        covered=cache(partial(excitation, fit, axis.hardware.travel)),
+        covered=Covered(tuple(fit), axis.hardware.travel),
         begun=begun,
     )
 

@@ -86,7 +86,7 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
             isolated(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
         except NoAnswer as error:
             raise InputError(f"{path}: {error}") from error
-        effects.append(_load(path))
+        effects.append(load_effect(path))
     return Catalogue(effects)
 
 
@@ -109,10 +109,11 @@ def _load_and_try(path: Path) -> None:
         require_sound,  # only a user's file needs the compiler to be read
     )
 
-    require_sound(_load(path), path)
+    require_sound(load_effect(path), path)
 
 
-def _load(path: Path) -> Effect:
+def load_effect(path: Path) -> Effect:
+    """The effect of a user's file, which is run. Raises InputError where it defines none."""
     spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise InputError(f"{path}: is not a Python file; an effect is one .py file")
