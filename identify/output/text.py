@@ -44,7 +44,7 @@ from identify.output.words.next_step import (
     supposed_in_words,
     wrong_body_in_words,
 )
-from identify.results import figure_of, html_of, text_of
+from identify.results import figure_of, html_of, report_of, text_of
 from identify.results.results import (
     Addition,
     AllAdded,
@@ -65,6 +65,8 @@ from twin.experiments.file import in_short
 from twin.model.machine import HistoryStep
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are printed
@@ -314,6 +316,14 @@ def _tables(result: FitResult | Comparison | Diagnosis) -> str:
     from identify.output.report import tables
 
     return tables(result)
+
+
+@report_of.register(Comparison | Diagnosis)
+def _page(result: Comparison | Diagnosis, path: Path) -> None:
+    from identify.output.report import write_report
+    from identify.output.report.subject import Subject
+
+    write_report(path, Subject.of(result))
 
 
 @figure_of.register(Comparison | Diagnosis)
