@@ -70,6 +70,12 @@ def force_constant_ripple(p: Values, q: Columns) -> Results:
     return {U: q.u * (1.0 + fourier(p, q.x / p["p"]))}
 
 
+@written_from("u_actual = u (1 + P(x));  P(x) = sum_k c_k cos(k pi (x - start)/length)")
+def position_dependent_force_constant(p: Values, q: Columns) -> Results:
+    along = np.clip((q.x - p["start"]) / p["length"], 0.0, 1.0)
+    return {U: q.u * (1.0 + np.cos(np.pi * np.outer(along, np.arange(1, 6))) @ numbered(p, "c"))}
+
+
 @written_from("Fc, Fs -> (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)) Fc, Fs")
 def friction_ripple(p: Values, q: Columns) -> Results:
     return {DRY: q.dry * (1.0 + fourier(p, q.x / p["p"]))}

@@ -45,6 +45,9 @@ SPECIAL = {
     "payload_mass": {"ratio": 0.37},
     "friction_ripple": {"p": 0.027, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
     "force_constant_ripple": {"p": 0.031, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
+    "position_dependent_force_constant": {
+        "start": -0.11, "length": 0.23, "c1": 0.3, "c2": -0.2, "c3": 0.1, "c4": 0.2, "c5": -0.1,
+    },
     "backlash": {"load": 0.3, "play": 3e-6, "frequency": 410.0, "damping": 0.21},
     "flexible_mode": {"load": 0.4, "frequency": 530.0, "damping": 0.13},
     "base_vibration": {"recoil": 0.35, "frequency": 97.0, "damping": 0.17},
