@@ -103,7 +103,9 @@ def _is_level(one: Fit, other: Fit, dataset: Dataset) -> bool:
 
     A parameter that the logs hardly tell goes on a little with every fit.
     """
-    same = 0.01  # of the error, by which the error told may be another then
+    # of the error, by which no error that is told is another by a hundredth, be it of logs that
+    # leave a third of it
+    same = 0.003
     moved = error_on(one.axis, dataset.logs) - error_on(other.axis, dataset.logs)
     return rms(moved) < same * other.error
 
