@@ -18,6 +18,7 @@ It is plain Python and also compiles, once, to native code (see twin.core.native
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -29,6 +30,7 @@ from types import FunctionType
 from typing import Any
 
 from twin.curve import Curve, FreeShape, Part
+from twin.errors import InputError
 from twin.excitation import Excitation as Excitation  # effects' files take it from here
 from twin.knee import Imitation, Knee
 
@@ -322,13 +324,35 @@ class Effect:
         }
 
 
+def load_effect(path: Path) -> Effect:
+    """The effect of a user's file, which is run. Raises InputError where it defines none."""
+    spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: is not a Python file; an effect is one .py file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, TypeError) and "Parameter" in reason:
+            reason += (
+                "; a Parameter has a name, unit, start, lower, upper and meaning, in this order"
+            )
+        raise InputError(f"{path}: cannot be loaded as an effect: {reason}") from error
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise InputError(
+            f"{path}: defines no EFFECT of type twin.effect.Effect; "
+            "see the worked example in examples/my_effect.py"
+        )
+    return effect
+
+
 def _again(module: str, file: str, number: int, count: int | None) -> Effect:
     """The effect of a file, as that one of several, of so many elements."""
-    if module in sys.modules or module.startswith("twin."):
-        effect: Effect = importlib.import_module(module).EFFECT
-    else:
-        from twin.effects import load_effect  # a user's file, which this process has not read
-
-        effect = load_effect(Path(file))
+    known = module in sys.modules or module.startswith("twin.")
+    # a user's file, which another process has not read
+    effect: Effect = importlib.import_module(module).EFFECT if known else load_effect(Path(file))
     sized = effect if count is None or effect.of_size is None else effect.of_size(count)
     return sized.numbered(number)
