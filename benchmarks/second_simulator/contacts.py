@@ -27,7 +27,8 @@ class Contact:
     """A moved mass (kg) on a contact with Fc and Fs (N), stiffness (N/m), and so on, SI units.
 
     kind: which law. noise: m rms, of a reading. slip: m/s, Stribeck speed. damping: N s/m, of the
-    bristle. loop: rad/s. shares, springs (SLIPS,): parts of the force and stiffness of the elements.
+    bristle. loop: rad/s. rate: Hz. shares, springs (SLIPS,): parts of the force and of the
+    stiffness of the elements.
     """
 
     kind: str
@@ -98,7 +99,7 @@ def _moves(rate: float, rng: np.random.Generator) -> np.ndarray:
     return path
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _simulate(kind, values, shares, springs, path, speed, noise, period):  # pragma: no cover
     """Readings m and commands N, a sample each; the command is held over the sample."""
     mass, coulomb, static, stiffness, slip, damping, viscous, loop = values
