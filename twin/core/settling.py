@@ -17,7 +17,8 @@ from twin.effect import WHEN, V
 
 Array = NDArray[np.float64]
 
-TRIED = 0.25  # of what readings hide, by which the axis is moved to see what a law answers
+TRIES = 8  # of how far the axis is moved in a sample
+BALANCED = 0.01  # of what was not, below which the force is balanced
 
 
 def settle(
@@ -62,28 +63,40 @@ def _settle(
     now, before = states[0], states[1]
     gone = 0.0
     for k in range(path.shape[0]):
-        gone *= kept
-        if not free[k]:
-            gone = 0.0
+        gone = kept * gone if free[k] else 0.0
         before[:] = now
         left = _left(
             entries, first, last, parameters, now, at, motion, others, pushed, k, path[k], dt,
             time_origin, io, row,
         )  # fmt: skip
-        if not free[k]:
+        if not free[k] or left == 0.0:
             continue
-        step = TRIED * room if left > 0.0 else -TRIED * room
-        now[:] = before
-        then = _left(
-            entries, first, last, parameters, now, at, motion, others, pushed, k,
-            path[k] + step / dt, dt, time_origin, io, row,
-        )  # fmt: skip
-        rise = (then - left) / step
-        if rise < 0.0:
-            moved[k] = min(max(gone - left / rise, -room), room) - gone
-            gone += moved[k]
-        now[:] = before
-        _left(
-            entries, first, last, parameters, now, at, motion, others, pushed, k,
-            path[k] + moved[k] / dt, dt, time_origin, io, row,
-        )  # fmt: skip
+        # As far as there is room, and from there by false position ("Illinois") to the balance.
+        near, near_left, far_left = 0.0, left, 0.0
+        far = (room if left > 0.0 else -room) - gone
+        step, then = far, left
+        for i in range(TRIES):
+            now[:] = before
+            then = _left(
+                entries, first, last, parameters, now, at, motion, others, pushed, k,
+                path[k] + step / dt, dt, time_origin, io, row,
+            )  # fmt: skip
+            short = then * left > 0.0
+            if abs(then) < BALANCED * abs(left) or i == TRIES - 1 or (i == 0 and short):
+                break
+            if i == 0:
+                far_left = then
+            elif short:
+                near, near_left, far_left = step, then, 0.5 * far_left
+            else:
+                far, far_left, near_left = step, then, 0.5 * near_left
+            step = (near * far_left - far * near_left) / (far_left - near_left)
+        if abs(then) >= abs(left):  # no law answers
+            step = 0.0
+            now[:] = before
+            _left(
+                entries, first, last, parameters, now, at, motion, others, pushed, k, path[k], dt,
+                time_origin, io, row,
+            )  # fmt: skip
+        moved[k] = step
+        gone += step
