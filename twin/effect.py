@@ -292,6 +292,15 @@ class Effect:
         return slot in self._names
 
     @property
+    def remembers(self) -> bool:
+        """Whether its force depends on the path that the axis came.
+
+        A friction that sticks remembers no more than that it does.
+        """
+        along = self.kind in (Kind.FORCE, *RUBBING)
+        return along and bool(self.states) and not self.sticks
+
+    @property
     def turn(self) -> tuple[int, int]:
         """When a law's turn is within a sample; effects of an equal one keep the model's order.
 

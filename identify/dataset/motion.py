@@ -13,8 +13,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from identify.dataset.bodies import Bodies
+from identify.dataset.path import Path
 from identify.dataset.readings import (
     ENOUGH,
     resolution_of,
@@ -146,6 +148,17 @@ class OtherAxis:
         return replace(self, readings=self.readings[at.start : at.stop + 1])
 
 
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """What a model moves its laws with memory beside the path of the readings at rest.
+
+    velocity (n,): m/s, by blocks. free (n,): in which blocks the readings let it be any.
+    """
+
+    velocity: Array
+    free: NDArray[np.bool_]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Motion of one axis over one log, in blocks.
@@ -161,7 +174,8 @@ class Motion:
     err along the track (identify.dataset.readings). ahead: s, by which the command was moved ahead
     of how it was logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a
     joint of a mechanism, over as many samples as raw; None for a plain axis, whose mass is all that
-    it moves.
+    it moves. path: what laws with memory follow; None: the readings as they are. slip: what a model
+    moves such laws beside it at rest.
     """
 
     name: str
@@ -182,6 +196,8 @@ class Motion:
     ahead: float = 0.0
     as_logged: Array | None = None
     bodies: Bodies | None = None
+    path: Path | None = None
+    slip: Slip | None = None
 
     def __repr__(self) -> str:
         return (
@@ -212,6 +228,8 @@ class Motion:
             others=np.ascontiguousarray(self.others[:, blocks]),
             bodies=None if self.bodies is None else self.bodies.during(at),
             as_logged=None if self.as_logged is None else self.as_logged[at],
+            path=None if self.path is None else self.path.during(at.start, at.stop),
+            slip=None,
             beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
@@ -237,6 +255,8 @@ class Motion:
             self.track.forget()
             if self.bodies is not None:
                 self.bodies.forget()
+            if self.path is not None:
+                self.path.forget()
             for name in ("smoothed_position", "unrippled"):
                 self.__dict__.pop(name, None)
 
@@ -264,6 +284,12 @@ class Motion:
     def velocity(self) -> Array:
         """(n,) m/s."""
         return self.signals[1]
+
+    @property
+    def followed(self) -> Array:
+        """Velocity (n,) m/s that laws with memory follow."""
+        own = self.velocity if self.path is None else self.path.velocity
+        return own if self.slip is None else own + self.slip.velocity
 
     @property
     def acceleration(self) -> Array:
@@ -425,6 +451,7 @@ def motion_of(
         velocity_weight=weight,
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(whole)),
+        path=Path(columns.readings, block, log.period, min(noise, encoder_noise)),
     )
 
 

@@ -72,6 +72,14 @@ class PreparedLog:
         position = self.test_function.mean(self.motion.position)
         return np.asarray((position >= low) & (position <= high))
 
+    @property
+    def told(self) -> Array:
+        """How much of each test function (n,) tells of a model: not what balances by itself."""
+        slip = self.motion.slip
+        if slip is None:
+            return np.ones(len(self))
+        return 1.0 - self.test_function.mean(slip.free.astype(float))
+
     @cached_property
     def extent(self) -> tuple[float, Reach, float]:
         """Largest command (N), lowest and highest position (m), highest speed (m/s)."""
@@ -99,9 +107,10 @@ def total_forces(table: Table, sets: Array, motion: Motion) -> Array:
     first, last, _, _, _ = table.axes[0]
     if first < last:
         signals = motion.joint_signals if table.reads_joints else motion.signals
+        path = motion.followed if table.remembers.any() else motion.velocity
         walk_sets(
             table.entries, first, last, sets, table.n_states, signals, motion.others,
-            motion.period, 0, totals, table.masses[0], motion.time_origin,
+            motion.period, 0, totals, table.masses[0], motion.time_origin, table.remembers, path,
         )  # fmt: skip
     return totals
 
