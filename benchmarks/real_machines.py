@@ -101,8 +101,34 @@ def _silverbox_log(data: np.ndarray) -> Log:
     return Log(SILVERBOX_RATE, {"x": AxisLog(columns)})
 
 
+def whole(folder: Path) -> dict[str, Log]:
+    """Each recording from end to end."""
+    mapping = load_mapping(EXAMPLES / "import_emps.toml")
+    path = folder / "silverbox" / "SNLS80mV.csv"
+    volts = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1))
+    return {
+        **{f"emps, {p.stem}": import_log(p, mapping) for p in (folder / "emps").glob("*.mat")},
+        **{f"laas, {name}": _laas(folder, name) for name in ("speed_test", "acc_current")},
+        **{f"arts, {p.stem}": _arts_log(p) for p in (folder / "arts").glob("*.json")},
+        "silverbox": _silverbox_log(volts),
+        "tx40": _tx40_log(folder),
+        "double pendulum": _pendulum(folder)[0],
+    }
+
+
 def tx40(folder: Path) -> Given:
     """An arm of six joints, whose motors were recorded: 13 parts of 0.6 s, as published."""
+    log, part = _tx40_log(folder), 3000
+    training, selection, test = (
+        {f"from part {a}": log.part(a * part, b * part) for a, b in parts}
+        for parts in (
+            ((0, 2), (3, 5), (6, 8), (9, 11), (12, 13)), ((2, 3), (8, 9)), ((5, 6), (11, 12)),
+        )
+    )  # fmt: skip
+    return training, selection, test
+
+
+def _tx40_log(folder: Path) -> Log:
     position, torque = (
         np.genfromtxt(folder / "tx40" / f"{name}_data.csv", delimiter=",", skip_header=1)
         for name in ("pos_read", "curr")
@@ -115,18 +141,19 @@ def tx40(folder: Path) -> Given:
         j: AxisLog({"position": position[:, i], "force": torque[:, i]}, ROTARY_UNITS)
         for i, j in enumerate(TX40_JOINTS)
     }
-    log, part = Log(TX40_RATE, at_joints(motors, gears)), 3000
-    training, selection, test = (
-        {f"from part {a}": log.part(a * part, b * part) for a, b in parts}
-        for parts in (
-            ((0, 2), (3, 5), (6, 8), (9, 11), (12, 13)), ((2, 3), (8, 9)), ((5, 6), (11, 12)),
-        )
-    )  # fmt: skip
-    return training, selection, test
+    return Log(TX40_RATE, at_joints(motors, gears))
 
 
 def double_pendulum(folder: Path) -> Given:
     """Sampled at about 300 Hz, brought to it; parts train, choose and test as published."""
+    log, edges = _pendulum(folder)
+    spans = {"first": (0, edges[0]), "next": (edges[0], edges[1]), "last": (edges[1], len(log))}
+    training, selection, test = ({n: log.part(*s)} for n, s in spans.items())
+    return training, selection, test
+
+
+def _pendulum(folder: Path) -> tuple[Log, tuple[int, int]]:
+    """The log, and at which samples its published parts begin."""
     path = folder / "double_pendulum" / "sys_id_061157.csv"
     time, *columns = np.genfromtxt(path, delimiter=",", skip_header=1).T
     even = np.arange(time[0], time[-1], 1.0 / PENDULUM_RATE)
@@ -135,13 +162,8 @@ def double_pendulum(folder: Path) -> Given:
         name: AxisLog(dict(zip(("position", "velocity", "force"), own, strict=True)), ROTARY_UNITS)
         for name, own in zip(PENDULUM_JOINTS, signals.swapaxes(0, 1), strict=True)
     }
-    log, edges = (
-        Log(PENDULUM_RATE, axes),
-        [np.searchsorted(even, time[k]) for k in (12_000, 16_500)],
-    )
-    spans = {"first": (0, edges[0]), "next": (edges[0], edges[1]), "last": (edges[1], len(log))}
-    training, selection, test = ({n: log.part(*map(int, s))} for n, s in spans.items())
-    return training, selection, test
+    first, second = (int(np.searchsorted(even, time[k])) for k in (12_000, 16_500))
+    return Log(PENDULUM_RATE, axes), (first, second)
 
 
 def _halves(log: Log) -> tuple[Log, Log]:

@@ -6,6 +6,10 @@ a fault is named from the size on that a fit would notice.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from twin.checks.axis import Axis
 from twin.checks.breaks import check_breaks, check_outliers
 from twin.checks.channels import check_crossed, check_timing, check_units
@@ -17,7 +21,7 @@ from twin.checks.content import (
     check_saturation,
 )
 from twin.checks.report import CheckReport, Fault, LogFinding, Severity
-from twin.logs.log import Log
+from twin.logs.log import AxisLog, Log
 
 __all__ = ["CheckReport", "Fault", "LogFinding", "Severity", "check_assumed", "check_log", "moves"]
 
@@ -48,4 +52,20 @@ def check_log(log: Log) -> CheckReport:
             for check in PARTS:
                 findings += check(axis)
     findings += check_crossed(sound)
+    still = {name for name, axis in log.axes.items() if _is_still(axis)}
+    still |= {axis.name for axis in sound if not axis.moves}
+    if still == set(log.axes):
+        findings = [_of_all(finding) for finding in findings]
     return CheckReport(tuple(findings))
+
+
+def _is_still(axis: AxisLog) -> bool:
+    """Whether the position is one value."""
+    position = axis.columns.get("position")
+    return position is not None and len(position) > 0 and bool(np.all(position == position[0]))
+
+
+def _of_all(finding: LogFinding) -> LogFinding:
+    """That an axis is at rest, where all are: nothing can be fitted to such a log."""
+    rests = finding.fault in (Fault.FLAT, Fault.WEAK_EXCITATION)
+    return replace(finding, severity=Severity.ERROR) if rests else finding

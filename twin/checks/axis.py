@@ -56,7 +56,9 @@ class Axis:
     def position_step(self) -> float:
         """Smallest change of the position in m; for a coarse encoder its count."""
         steps = np.abs(np.diff(self.log.position))
-        least = float(steps[steps > 0.0].min(initial=np.inf)) if steps.any() else 0.0
+        rounding = 4.0 * np.finfo(float).eps * float(np.abs(self.log.position).max())
+        steps = steps[steps > rounding]  # less is made by units and gears, and none of the encoder
+        least = float(steps.min()) if len(steps) else 0.0
         return least if self.position_held else max(count_of(self.log.position), least)
 
     @cached_property
@@ -78,6 +80,23 @@ class Axis:
     def force_noise(self) -> float:
         """White part of the command, N rms."""
         return white_noise(self.log.force)
+
+    @cached_property
+    def noise_of_force(self) -> float:
+        """That part of it, N rms, which neither position nor setpoint has within a few samples.
+
+        A loop makes a rough command of a rough reading, and a mass answers it: both are no noise.
+        """
+        around = np.arange(-3, 4)  # samples in which a loop answers, and a mass
+        rough = np.diff(self.log.force, 4)
+        signals = (self.log.columns.get(n) for n in ("position", "setpoint_position"))
+        sources = [np.diff(signal, 4) for signal in signals if signal is not None]
+        if len(rough) < 100 * len(around):  # of which so many columns tell nothing
+            return self.force_noise
+        columns = np.column_stack([np.roll(one, k) for one in sources for k in around])
+        columns /= np.abs(columns).max(axis=0) + np.finfo(float).tiny
+        gains = np.linalg.lstsq(columns.T @ columns, columns.T @ rough, rcond=1e-12)[0]
+        return min(usual_size(rough - columns @ gains) / 70**0.5, self.force_noise)
 
     @cached_property
     def force_size(self) -> float:
@@ -131,9 +150,15 @@ class Axis:
 
     @cached_property
     def jumps(self) -> Array:
-        """(n - 2,) second difference of the position in m where it is impossible, else 0."""
+        """(n - 2,) second difference of the position in m where it is impossible, else 0.
+
+        Nor does a jump have neighbours of its size: those of a fast motion are alike.
+        """
         second = np.abs(np.diff(self.log.position, 2))
-        return np.where(second > self.possible_jump, second, 0.0)
+        unlikely = second > self.possible_jump
+        reach = round(max(20e-3 * self.sample_rate, 25))  # longer than a break, shorter than a move
+        unlikely[unlikely] = second[unlikely] > UNUSUAL * _usual_about(second, unlikely, reach)
+        return np.where(unlikely, second, 0.0)
 
     @cached_property
     def curved_at(self) -> NDArray[np.intp]:
@@ -167,7 +192,7 @@ class Axis:
         Nor where friction with a memory explains it: what lags by a distance and not by a time is
         none. How long it is, is told away from standstill.
         """
-        found = self.lag_of(self.force, self.regressors)
+        found = self.lag_of(self.force, self.regressors) if self._changes_often else 0.0
         beside = self.lag_of(self.force, self.remembering) if found else 0.0
         same_lag = 0.3  # largest difference of a lag with and without a memory, as a part of it
         if not beside or abs(beside - found) >= same_lag * abs(found):
@@ -175,6 +200,16 @@ class Axis:
         going, _ = find_lag(self.force, self.regressors, self.going, self.smoother.block)
         told = self.going.mean() > KEPT_PART
         return going if told and abs(going - found) < PHYSICAL else found
+
+    @property
+    def _changes_often(self) -> bool:
+        """Whether the force changes in several parts of the log: what lags one step is no lag.
+
+        A single step is explained by many things.
+        """
+        parts = np.array_split(self.force, 8)
+        lively = 0.04 * float(np.ptp(self.force))  # least range of a part, of that of the whole
+        return sum(float(np.ptp(part)) > lively for part in parts) >= 3  # more than a step's two
 
     def lag_of(self, signal: Array, explained_by: Array) -> float:
         """Lag (s) of a signal (m,) behind its regressors (m, k); 0 where that is not clear."""
@@ -198,6 +233,37 @@ class Axis:
         span = slice(max(-shift, 0), len(self.force) - max(shift, 0))
         force = self.force[span.start + shift : span.stop + shift]
         return fit_dynamics(force, self.regressors[span], self.kept[span], span.start, self.rare)
+
+    @property
+    def pushed_back(self) -> bool:
+        """Whether force and acceleration are opposed in each part of the log that tells it.
+
+        What the check does not know, such as a joint that another moves, may oppose them in all.
+        """
+        parts = np.array_split(np.arange(len(self.force)), 3)  # of the log, of which two may agree
+        fits = (
+            fit_dynamics(self.force[p], self.regressors[p], self.kept[p], 0, self.rare)
+            for p in parts
+        )
+        masses = [fit.mass for fit in fits if fit.mass is not None and fit.mass_matters]
+        return max(masses, default=-1.0) < 0.0
+
+    def is_kicked(self, first: int, last: int) -> bool:
+        """Whether an unusual force makes the change of speed at samples ``first`` to ``last``.
+
+        Such is a setpoint whose speed jumps: force and motion agree, and neither is off. A loop
+        that answers a wrong reading pushes back.
+        """
+        near = 10  # samples either way, from which a course is told
+        begin, end = max(first - near, 0), min(last + near, len(self.log) - 1)
+        force, x = self.log.force[begin : last + 1], self.log.position
+        pushed = force - median(force)
+        most = float(pushed[np.argmax(np.abs(pushed))])
+        before, after = (float(x[k] - x[max(k - near // 2, 0)]) for k in (first - 1, end))
+        made = 2.0 * (after - before) / near  # m a sample
+        bend = float(self.jumps[max(first - 1, 0) : last].max(initial=0.0))
+        lasting = 0.2  # of a bend, that is a change of speed and not taken back in the next sample
+        return abs(most) > self.force_size and made * np.sign(most) > lasting * bend
 
     def span(self, rows: slice) -> Array:
         """Orthonormal basis (r, k) of what its motion can explain, at some of the samples."""
@@ -223,6 +289,22 @@ class Axis:
         presliding = (0.003, 0.01, 0.03, 0.1, 0.3)
         widths = np.ptp(position) * np.array(presliding)
         return np.column_stack([self.regressors, *(_built_up(position, w) for w in widths)])
+
+    def follows_late(self, lag: float) -> bool:
+        """Whether a position that lags its setpoint (by s) does so as a loop does.
+
+        The error of a loop goes with speed and acceleration; late readings are the setpoint of an
+        earlier time.
+        """
+        goal = self.log.columns["setpoint_position"]
+        samples = round(lag * self.sample_rate)
+        late = np.r_[np.full(samples, goal[0]), goal[: len(goal) - samples]]
+        error = self.smoother.position(goal - self.log.position)
+        left = self.smoother.position(late - self.log.position)
+        rates = [self.velocity, self.acceleration, np.ones_like(error)]
+        as_loop = _fitted(error, np.column_stack(rates))[1]
+        as_good = 2.0  # times what late readings leave, that a loop may leave
+        return as_loop < as_good * float(np.std(left))
 
     @cached_property
     def soft_loop(self) -> bool:
@@ -265,6 +347,13 @@ def _built_up(position: Array, width: float) -> Array:
         held = min(max(held + step, -1.0), 1.0)
         out.append(held)
     return np.array(out)
+
+
+def _usual_about(sizes: Array, at: NDArray[np.bool_], reach: int) -> Array:
+    """(k,) the usual one of some sizes (n,) within ``reach`` samples of each of k of them."""
+    places = np.flatnonzero(at)
+    first = np.clip(places - reach, 0, max(len(sizes) - 2 * reach - 1, 0))
+    return np.array([np.median(sizes[k : k + 2 * reach + 1]) for k in first])
 
 
 def count_of(signal: Array) -> float:

@@ -42,7 +42,8 @@ def check_timing(axis: Axis) -> Iterator[LogFinding]:
         apart = abs(force) > allowed
         late = "position" if apart else " and ".join(n for n in READINGS if n in columns)
         following = 30e-3  # s, what a slow position loop may account for
-        slow = lag > max(allowed, following) and not axis.soft_loop
+        loops = axis.soft_loop or (lag > 0.0 and axis.follows_late(lag))
+        slow = lag > max(allowed, following) and not loops
         if lag < -allowed or slow:
             yield axis.warning(Fault.LAG, *_lagging(axis, "position", lag, "its setpoint", late,
                                                     "setpoint_position"))  # fmt: skip
@@ -114,17 +115,18 @@ def check_units(axis: Axis) -> Iterator[LogFinding]:
         travel = np.ptp(axis.log.columns[name]) if name in axis.log.columns else 0.0
         longest_travel = 10.0  # m; farther, the unit is wrong
         if travel > longest_travel and not axis.log.kind.rotary:
-            yield axis.error(
+            yield axis.warning(
                 Fault.UNIT,
                 f"{name} travels {travel:.4g} m, more than {longest_travel:g} m; "
                 f"in mm it would be {travel / 1e3:.4g} m",
-                "correct its unit in the import map",
+                "if it is none of so long a rail, correct its unit in the import map",
             )
     if not axis.moves:
         return
     yield from _ratios(axis)
     fit, units = axis.dynamics, axis.log.kind
-    if fit.explains and fit.mass_matters and fit.mass is not None and fit.mass < 0.0:
+    against = fit.explains and fit.mass_matters and fit.mass is not None and fit.mass < 0.0
+    if against and axis.pushed_back:
         yield axis.error(
             Fault.SIGN,
             f"the force acts against the acceleration, as if the "

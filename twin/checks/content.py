@@ -33,13 +33,7 @@ def check_content(axis: Axis) -> Iterator[LogFinding]:
             remedy = "cut the log there, or leave the signal out if it was not recorded"
             where = f"from {bad[0] / axis.sample_rate:.6g} s"
             yield axis.error(Fault.NOT_FINITE, what, remedy, where)
-    flat = {n: c[0] for n, c in axis.log.columns.items() if len(c) and np.all(c == c[0])}
-    for name in (n for n in READINGS if n in flat):
-        what = f"{name} is {flat[name]:.6g} {axis.log.units[name]} throughout"
-        if name in ("position", "velocity") and "setpoint_position" in flat:
-            yield axis.warning(Fault.WEAK_EXCITATION, what, "leave the axis out of the fit")
-        else:
-            yield axis.error(Fault.FLAT, what, "check that the channel was connected and mapped")
+    yield from _unchanging(axis)
     slowest = 10.0  # Hz; no motion of an axis shows at fewer samples
     if axis.sample_rate < slowest:
         what = (
@@ -51,6 +45,33 @@ def check_content(axis: Axis) -> Iterator[LogFinding]:
     if axis.duration < shortest:
         what = f"the log lasts {axis.duration:.3g} s, a fit needs {shortest:g} s"
         yield axis.error(Fault.TOO_SHORT, what, "record longer")
+
+
+def _unchanging(axis: Axis) -> Iterator[LogFinding]:
+    """Readings that are one value: of an axis at rest, of a constant force, of a dead channel."""
+    columns, kind = axis.log.columns, axis.log.kind
+    flat = {n: c[0] for n, c in columns.items() if len(c) and np.all(c == c[0])}
+    told = {
+        n: f"{n} is {flat[n]:.6g} {axis.log.units[n]} throughout" for n in READINGS if n in flat
+    }
+    if "position" in told:
+        fault = Fault.WEAK_EXCITATION if "setpoint_position" in flat else Fault.FLAT
+        remedy = "leave the axis out of the fit, or check that the channel was connected and mapped"
+        yield axis.warning(fault, told["position"], remedy)
+        return
+    driving = "force" if "force" in columns else "current"
+    if flat.get(driving):
+        yield axis.warning(
+            Fault.FLAT,
+            f"{told.pop(driving)}: with no other force the {kind.mass_name} and the friction are "
+            "not told apart, only what they are to each other and to that force",
+            "add logs of other forces; if it was no constant force, check that the channel was "
+            "connected and mapped",
+        )
+    for name, what in told.items():
+        spoils = name in (driving, "velocity")
+        tell = axis.error if spoils else axis.warning
+        yield tell(Fault.FLAT, what, "check that the channel was connected and mapped")
 
 
 def _missing(axis: Axis) -> Iterator[LogFinding]:
@@ -103,7 +124,7 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding
 
 def check_excitation(axis: Axis) -> Iterator[LogFinding]:
     """Weak excitation and coarse position."""
-    unit = axis.log.units["position"]
+    unit = axis.log.kind.position
     often = float(np.quantile(np.abs(axis.velocity), 0.9)) > axis.still  # a tenth of the log
     if not (axis.moves and often):
         yield axis.warning(
@@ -135,7 +156,7 @@ def check_excitation(axis: Axis) -> Iterator[LogFinding]:
             Fault.COARSE_POSITION,
             f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
             f"{axis.position_step:.2g} {unit}), which over {axis.smoother.length * 1e3:.2g} ms "
-            f"makes {noise:.2g} of the {rms:.2g} {axis.log.units['setpoint_acceleration']} seen",
+            f"makes {noise:.2g} of the {rms:.2g} {axis.log.kind.acceleration} seen",
             "use a finer encoder or a livelier motion",
         )
 
@@ -158,7 +179,7 @@ def _directions(axis: Axis) -> Iterator[LogFinding]:
     if high - low < 0.05 * middle:  # spread of the speeds as a part of their median
         yield axis.warning(
             Fault.WEAK_EXCITATION,
-            f"there is one speed only, {middle:.3g} {axis.log.units['velocity']}, so that the "
+            f"there is one speed only, {middle:.3g} {axis.log.kind.velocity}, so that the "
             "Coulomb and the viscous friction cannot be told apart",
             "add other speeds",
         )
@@ -171,30 +192,35 @@ def check_command(axis: Axis) -> Iterator[LogFinding]:
     """Held values, noise, and single samples."""
     if not axis.moves:
         return
-    force, unit = axis.log.force, axis.log.units["force"]
+    force, unit = axis.log.force, axis.log.kind.force
     if count := held_samples(force):
         yield held(axis, "the force", count)
         return
     least = 0.3 * axis.force_size  # of the command
     steps = np.abs(np.diff(force)).max()  # a sample off its neighbours is off one beside it
-    if steps > least and len(single := _single(off := off_course(force), least)):
+    off = off_course(force) if steps > least else force
+    single = [k for k in _single(off, least) if not axis.is_kicked(k, k)] if steps > least else []
+    if single:
         what = f"single samples of the force are off by up to {off.max():.3g} {unit}"
         where = f"{single[0] / axis.sample_rate:.6g} s{and_more(len(single))}"
         remedy = "repair these samples, or cut the log there"
-        yield axis.error(Fault.OUTLIERS, what, remedy, where)
+        yield axis.warning(Fault.OUTLIERS, what, remedy, where)
     # noise that hides what the motion does not explain, even when it is averaged
     noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
+    noisy = 0.03  # averaged noise of the command, as a part of it; 1 % of its rating leaves 0.02
+    if averaged <= noisy * float(np.std(force)):
+        return
+    noise, averaged = axis.noise_of_force, axis.smoother.held_noise(axis.noise_of_force)
     left = float(np.median(np.abs(axis.dynamics.residual)))
     # averaged noise, as a part of what the motion leaves unexplained
     hides = axis.dynamics.explains and averaged >= 0.4 * left
-    noisy = 0.03  # averaged noise of the command, as a part of it; 1 % of its rating leaves 0.02
     if hides and averaged > noisy * float(np.std(force)):
         yield axis.warning(
             Fault.NOISE,
             f"the force has noise of {noise:.3g} {unit} rms from sample to sample, {averaged:.2g} "
             f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
             "the motion",
-            "record the command that the controller computed, or shield the cable",
+            "record the command that the controller computed, at its rate, or shield the cable",
         )
 
 
@@ -234,7 +260,7 @@ def check_saturation(axis: Axis) -> Iterator[LogFinding]:
             first, seconds = stuck
             yield axis.warning(
                 Fault.SATURATION,
-                f"the force stays at its extreme of {extreme:.4g} {axis.log.units['force']} for "
+                f"the force stays at its extreme of {extreme:.4g} {axis.log.kind.force} for "
                 f"{seconds:.3g} s in all",
                 "move more gently if the drive was at its limit, and record its actual force",
                 f"from {first:.6g} s",

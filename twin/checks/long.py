@@ -51,8 +51,9 @@ def together(parts: Sequence[CheckedPart]) -> CheckReport:
 
 
 def _said(seen: Sequence[tuple[CheckedPart, LogFinding]], parts: int) -> LogFinding:
-    """A fault that was seen in some parts, of its worst severity."""
-    part, first = next(((p, f) for p, f in seen if f.severity is Severity.ERROR), seen[0])
+    """A fault that was seen in some parts, of its worst severity; of all parts, of its least."""
+    told = Severity.WARNING if seen[0][1].fault in OF_THE_WHOLE else Severity.ERROR
+    part, first = next(((p, f) for p, f in seen if f.severity is told), seen[0])
     if first.where == WHOLE and len(seen) == parts:
         return first
     place = f"{part.start:g} to {part.stop:g} s"

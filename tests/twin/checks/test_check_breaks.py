@@ -43,7 +43,7 @@ def test_missing_samples_are_counted_by_the_way_that_the_motion_went_on(lost):
     columns = {n: np.delete(c, slice(1500, 1500 + lost)) for n, c in whole.items()}
     (found,) = findings(Log(RATE, {"x": AxisLog(columns)}), Fault.MISSING)
     assert int(found.what.split()[0]) == pytest.approx(lost, abs=1 + 0.1 * lost)
-    assert (found.where, found.severity) == ("1.499 to 1.5 s", Severity.ERROR)
+    assert (found.where, found.severity) == ("1.499 to 1.5 s", Severity.WARNING)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -111,7 +111,7 @@ def test_a_counter_that_wraps_goes_back_by_most_of_the_travel(signals):
     ("places", "part", "fault", "words", "severity"),
     [([FAST], 0.7, Fault.UNEVEN, "off by ", Severity.WARNING),
      ([FAST - 10, FAST + 10], 0.7, Fault.UNEVEN, "off by ", Severity.WARNING),
-     ([FAST], 1.4, Fault.OUTLIERS, "off by up to ", Severity.ERROR)],
+     ([FAST], 1.4, Fault.OUTLIERS, "off by up to ", Severity.WARNING)],
 )  # fmt: skip
 def test_a_clock_that_skips_is_less_than_two_samples_motion(places, part, fault, words, severity):
     """A sample that is off bends the position by twice as much."""

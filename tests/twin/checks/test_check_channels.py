@@ -182,13 +182,28 @@ def test_a_signal_that_never_changes_is_told_with_its_value(name):
                      change=change)  # fmt: skip
 
     (found,) = check_log(of()).findings
-    assert (found.fault, found.severity) == (Fault.FLAT, Severity.ERROR)
-    assert found.what == f"{name} is 0.375 {LINEAR_UNITS[name]} throughout"
+    constant = name == "force"  # which is an experiment, of which only ratios are told
+    assert (found.fault, found.severity) == (Fault.FLAT, WARNING if constant else ERROR)
+    assert found.what.startswith(f"{name} is 0.375 {LINEAR_UNITS[name]} throughout")
     assert not findings(of(last=1e-9), Fault.FLAT)
     (found,) = check_log(of(setpoint=0.1)).findings
-    standing = name == "position"
-    assert found.fault is (Fault.WEAK_EXCITATION if standing else Fault.FLAT)
-    assert found.severity is (Severity.WARNING if standing else Severity.ERROR)
+    assert found.fault is (Fault.FLAT if constant else Fault.WEAK_EXCITATION)
+
+
+def test_a_log_in_which_nothing_moves_is_refused_and_one_axis_at_rest_is_not():
+    def still(columns):
+        columns["position"][:] = 0.375
+
+    def dead(columns):
+        columns["force"][:] = 0.0
+
+    moving, at_rest = (drive(change=c).axes["x"] for c in (None, still))
+    (found,) = check_log(Log(1000.0, {"a": at_rest, "b": at_rest})).findings[:1]
+    assert found.severity is ERROR
+    report = check_log(Log(1000.0, {"a": at_rest, "b": moving}))
+    assert [(f.axis, f.severity) for f in report.findings] == [("a", WARNING)]
+    (found,) = check_log(drive(change=dead)).findings
+    assert (found.fault, found.severity) == (Fault.FLAT, ERROR)
 
 
 @pytest.mark.parametrize(

@@ -176,21 +176,21 @@ PUSH = "force and motion contradict each other by up to "
 
 CASES = {
     "a push": Case(added("force", slice(2000, 2030)), [0.4], 60.0, Fault.OUTLIERS, PUSH, 60.0,
-                   (2.0, 2.03), ERROR),
+                   (2.0, 2.03)),
     **{f"a push with {offset:g} N": Case(disturbed(offset, np.ones(30)), [0.85], 1.2,
-                                         Fault.OUTLIERS, PUSH, severity=ERROR)
+                                         Fault.OUTLIERS, PUSH)
        for offset in (0.0, 100.0)},
     **{f"to and fro with {offset:g} N": Case(disturbed(offset, FRO), [0.85], 1.2, Fault.OUTLIERS,
-                                             "the force jumps to and fro", severity=ERROR)
+                                             "the force jumps to and fro")
        for offset in (0.0, 100.0)},
     "a burst of noise": Case(added("force", slice(2000, 2030), BURST), [0.05], 20.0, Fault.OUTLIERS,
-                             "the force jumps to and fro", None, (2.0, 2.03), ERROR),
+                             "the force jumps to and fro", None, (2.0, 2.03)),
     "one bend of the force": Case(added("force", slice(2000, None)), [40.0], 0.0, Fault.OUTLIERS,
                                   ""),
     "single samples": Case(added("force", [1200, 2600], coulomb=0.0), [0.25 * SINGLE],
                            0.35 * SINGLE, Fault.OUTLIERS,
                            "single samples of the force are off by up to ", 0.35 * SINGLE,
-                           "1.2 s and 1 more times", ERROR),
+                           "1.2 s and 1 more times"),
     "noise": Case(added("force", slice(None), WHITE[:4000]), [0.024 * NOISY], 0.036 * NOISY,
                   Fault.NOISE, "the force has noise of ", 0.036 * NOISY, "whole log"),
     "steps": Case(added("position", slice(2500, None), signals=BOTH),
@@ -202,7 +202,7 @@ CASES = {
     "idle": Case(moving, [0.16], 0.06, Fault.WEAK_EXCITATION, "the noise of its position (", 1e-6),
     # nine tenths of normal noise stay below 1.28 of its rms, which adds to the speed
     "a speed in its noise": Case(lambda times: noisy(times * SLOWEST * T), [4.2], 3.3,
-                                 Fault.WEAK_EXCITATION, "the axis hardly moves"),
+                                 Fault.WEAK_EXCITATION, "the axis hardly moves", severity=ERROR),
     "forwards": Case(back_for(1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                      "the axis moves only forwards (", 98.5),
     "backwards": Case(back_for(-1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
@@ -223,8 +223,7 @@ CASES = {
     "a drive that is off": Case(off_below, [0.0], 0.25, Fault.SATURATION, "extreme of 0.25 N"),
     **{f"travel of {name}": Case(
         travelling(name), [(9.9, LINEAR_UNITS), (10.1, ROTARY_UNITS)], (10.1, LINEAR_UNITS),
-        Fault.UNIT, f"{name} travels 10.1 m, more than 10 m; in mm it would be 0.0101 m",
-        severity=ERROR)
+        Fault.UNIT, f"{name} travels 10.1 m, more than 10 m; in mm it would be 0.0101 m")
        for name in ("position", "setpoint_position")},
     **{f"clocks {way}": Case(
         drifted, [0.4 * ppm], ppm, Fault.DRIFT, f"ms a second {way} against the position (", 90.0)
