@@ -287,6 +287,24 @@ def load_dependent_friction(p: Values, q: Columns) -> Results:
     return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
 
 
+@written_from("F = area p + area_2 p_2")
+def pressure_force(p: Values, q: Columns) -> Results:
+    return {OUT: np.stack([q.pressure, q.pressure_2], 1) @ [p["area"], p["area_2"]]}
+
+
+@written_from("Fc, Fs -> Fc, Fs (1 + growth |p| + growth_2 |p_2|)")
+def pressure_friction(p: Values, q: Columns) -> Results:
+    factor = 1.0 + np.abs(np.stack([q.pressure, q.pressure_2], 1)) @ [p["growth"], p["growth_2"]]
+    return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
+
+
+@written_from("Fc, Fs -> Fc, Fs (1 - dry (T - T0));  sigma2 -> sigma2 (1 - viscous (T - T0))")
+def temperature_friction(p: Values, q: Columns) -> Results:
+    kept = [1.0 - p[n] * (q.temperature - p["T0"]) for n in ("dry", "viscous")]
+    dry, viscous = (np.where(k < 0.01, 0.01, k) for k in kept)
+    return {DRY: q.dry * dry, VISCOUS: q.viscous * viscous}
+
+
 @written_from("sigma2 -> sigma2 (1 - loss |v|/(vt + |v|))")
 def shear_thinning(p: Values, q: Columns) -> Results:
     moved = np.abs(q.v) > 0.0

@@ -59,8 +59,14 @@ ACC = 20  # m/s^2, absolute acceleration of the bodies on the axis
 LOAD = 21  # N, what the bodies of a mechanism take of this joint; zero on a plain axis
 SPEEDS = 22  # m/s, velocities of all joints of a mechanism in the order of its axes; else zero
 MOST_JOINTS = 64
-IO_SIZE = SPEEDS + MOST_JOINTS
+PRESSURE = SPEEDS + MOST_JOINTS  # Pa, as logged; zero where it was not, and so are the next two
+PRESSURE_2 = PRESSURE + 1  # Pa, of the other chamber
+TEMPERATURE = PRESSURE + 2  # K
+IO_SIZE = PRESSURE + 3
 COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the weight of each
+
+# What a log may hold beside the motion, in the order of the slots from PRESSURE on.
+CHANNELS = {"PRESSURE": "pressure", "PRESSURE_2": "pressure_2", "TEMPERATURE": "temperature"}
 
 Law = Callable[[Any, Any, Any], None]
 
@@ -320,6 +326,11 @@ class Effect:
     def reads_other_axis(self) -> bool:
         """Whether the law depends on the motion of the machine's other axis."""
         return any(self.reads(slot) for slot in ("X_OTHER", "V_OTHER", "A_OTHER"))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The fields of a log, such as "pressure", that the law reads beside the motion."""
+        return tuple(field for slot, field in CHANNELS.items() if self.reads(slot))
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name; KeyError where there is none."""

@@ -26,6 +26,7 @@ from identify.dataset.readings import (
     together,
 )
 from identify.dataset.test_function import LEAST_BLOCKS
+from twin.effect import CHANNELS
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR
@@ -164,18 +165,19 @@ class Motion:
     """Motion of one axis over one log, in blocks.
 
     name: of the log. track: its signals. others (3, n): position, velocity, acceleration of the
-    other axis (zero where there is none, or more than one). period: s, of a block. start: s, middle
-    of the first block. sample_period: s, of the log. position_noise: m rms. time_origin: s, when
-    the log began, by the phase of what repeats in time. follows: whether the position follows a
-    logged setpoint; None where none was logged. units, other_units: of the axis and of the other
-    one, by which m, N and so on are to be read. beside: on a machine with more than two axes the
-    others, by name. velocity_weight: 1, of a measured velocity beside the readings
-    (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the readings
-    err along the track (identify.dataset.readings). ahead: s, by which the command was moved ahead
-    of how it was logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a
-    joint of a mechanism, over as many samples as raw; None for a plain axis, whose mass is all that
-    it moves. path: what laws with memory follow; None: the readings as they are. slip: what a model
-    moves such laws beside it at rest.
+    other axis (zero where there is none, or more than one), and with channels (6, n) these in SI.
+    channels: fields of the log that are among these, such as "pressure"; others are zero. period:
+    s, of a block. start: s, middle of the first block. sample_period: s, of the log.
+    position_noise: m rms. time_origin: s, when the log began, by the phase of what repeats in time.
+    follows: whether the position follows a logged setpoint; None where none was logged. units,
+    other_units: of the axis and of the other one, by which m, N and so on are to be read. beside:
+    on a machine with more than two axes the others, by name. velocity_weight: 1, of a measured
+    velocity beside the readings (identify.dataset.readings); 0 where there is none. ripples: m,
+    periods at which the readings err along the track (identify.dataset.readings). ahead: s, by
+    which the command was moved ahead of how it was logged, as_logged (n * samples a block,) N; None
+    where it was not. bodies: of a joint of a mechanism, over as many samples as raw; None for a
+    plain axis, whose mass is all that it moves. path: what laws with memory follow; None: the
+    readings as they are. slip: what a model moves such laws beside it at rest.
     """
 
     name: str
@@ -198,6 +200,7 @@ class Motion:
     bodies: Bodies | None = None
     path: Path | None = None
     slip: Slip | None = None
+    channels: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -439,7 +442,8 @@ def motion_of(
         name=name,
         axis=axis,
         track=columns.kept if bodies is None else columns,  # of joints there are many
-        others=_none(whole // block) if other is None else other.signals,
+        others=_beside(log.axes[axis], other, whole, block),
+        channels=_channels(log.axes[axis]),
         period=block * log.period,
         start=0.5 * block * log.period,
         sample_period=log.period,
@@ -458,6 +462,22 @@ def motion_of(
 def shortest_log(period: float) -> float:
     """Least length (s) of a log for identification, of samples of a period (s)."""
     return max(SHORTEST_LOG, LEAST_BLOCKS**2 * period)
+
+
+def _channels(own: AxisLog) -> tuple[str, ...]:
+    """What a log holds of an axis beside its motion."""
+    return tuple(field for field in CHANNELS.values() if field in own.columns)
+
+
+def _beside(own: AxisLog, other: OtherAxis | None, whole: int, block: int) -> Array:
+    """Signals of the other axis and of channels, by blocks of so many samples of ``whole``."""
+    signals = _none(whole // block) if other is None else other.signals
+    if not _channels(own):
+        return signals
+    none = np.zeros(whole + 1)
+    readings = np.stack([own.columns.get(f, none)[: whole + 1] for f in CHANNELS.values()])
+    middle = 0.5 * (readings[:, 1:] + readings[:, :-1])
+    return np.vstack([signals, middle.reshape(len(middle), -1, block).mean(axis=2)])
 
 
 @lru_cache(maxsize=1)  # the axes of a log share it

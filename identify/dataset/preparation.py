@@ -21,6 +21,7 @@ from identify.dataset.given_logs import (
     apart,
     is_driven,
     nothing_told,
+    require_channels,
     require_one_kind,
     require_samples,
     telling_in,
@@ -77,6 +78,7 @@ def _prepared(
     for name, axis in model.axes.items():
         for logs in given.values():
             require_one_kind(logs, name, axis)
+            require_channels(logs, name, axis)
         driven, machine = is_driven(axis), tuple(model.axes)
         found = {role: telling_in(g, name, machine, driven=driven) for role, g in given.items()}
         going = {role: telling for role, (telling, _) in found.items()}

@@ -26,6 +26,7 @@ from twin.effect import (
     MASS,
     MOVED,
     OUT,
+    PRESSURE,
     READING,
     SPEEDS,
     STATIC,
@@ -45,6 +46,7 @@ Array = NDArray[np.float64]
 Entries = NDArray[np.int64]
 
 LOAD_ROW = 3  # of a joint's motion; the velocities of all joints follow
+CHANNEL_ROW = 3  # of what is beside a motion; what else was logged, by the slots of io
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
@@ -60,7 +62,8 @@ def walk(
 
     motion (3, n): position m, velocity m/s, command N; of a joint also its load N and the
     velocities of all joints (4 + n_axes, n). others (3, n): position, velocity, acceleration of
-    the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
+    the other axis, and channels that were logged (6, n); mass: moved mass, kg; time_origin: s, when
+    sample 0 was.
     The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
     that holds a measured axis at rest is not determined.
     rows (n_entries, n): N.
@@ -123,6 +126,8 @@ def arrive(io, motion, others, k, begin, dt, time_origin):
     io[X_OTHER] = others[0, k]
     io[V_OTHER] = others[1, k]
     io[A_OTHER] = others[2, k]
+    for j in range(others.shape[0] - CHANNEL_ROW):
+        io[PRESSURE + j] = others[CHANNEL_ROW + j, k]
     if motion.shape[0] > LOAD_ROW:
         io[LOAD] = motion[LOAD_ROW, k]
         for j in range(motion.shape[0] - LOAD_ROW - 1):

@@ -35,6 +35,9 @@ SPECIAL = {
     "position_dependent_friction": {
         "start": -0.11, "length": 0.23, "c1": 0.5, "c2": -0.3, "c3": 0.7, "c4": 0.2, "c5": -0.4,
     },
+    "pressure_force": {"area": 0.3, "area_2": -0.2},
+    "pressure_friction": {"growth": 0.3, "growth_2": 0.2},
+    "temperature_friction": {"T0": 0.1, "dry": 2.0, "viscous": -1.5},
     "shear_thinning": {"loss": 0.6, "vt": 0.07},
     "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
     "wear": {"rate": 300.0},
