@@ -85,13 +85,14 @@ def quieted(readings: Array, noise: float, scales: int) -> Array:
     if noise == 0.0:
         return readings
     mean = readings - readings[0]
-    kept, most = np.zeros(len(readings)), largest(len(readings)) * noise
+    out, most = readings.copy(), largest(len(readings)) * noise
     for j, gain in enumerate(_gains(scales)):
         smooth = _smoothed(mean, 1 << j)
-        detail = mean - smooth
-        kept += np.where(np.abs(detail) > most * gain, detail, 0.0)
+        mean -= smooth
+        mean[np.abs(mean) > most * gain] = 0.0
+        out -= mean
         mean = smooth
-    return np.asarray(readings[0] + kept + mean)
+    return out
 
 
 def largest(count: int) -> float:
@@ -120,10 +121,14 @@ def _smoothed(signal: Array, apart: int) -> Array:
     """Mean (n,) of five values so many samples apart; beyond the ends are the end values."""
     n, padded = len(signal), np.pad(signal, 2 * apart, mode="edge")
     far, near, middle = SPLINE
-    out = middle * padded[2 * apart : 2 * apart + n]
-    out += near * (padded[apart : apart + n] + padded[3 * apart : 3 * apart + n])
-    out += far * (padded[:n] + padded[4 * apart :])
-    return out
+    out = middle * signal
+    beside = padded[apart : apart + n] + padded[3 * apart : 3 * apart + n]
+    beside *= near
+    out += beside
+    np.add(padded[:n], padded[4 * apart :], out=beside)
+    beside *= far
+    out += beside
+    return np.asarray(out)
 
 
 def _highest(signal: Array, samples: int) -> Array:
