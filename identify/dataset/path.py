@@ -3,12 +3,12 @@
 Noise makes path. Where readings of a standing axis scatter, the sum of their steps is no motion,
 but a bristle, a layer or a contact follows every one of them, and what it held is forgotten. So a
 law that remembers follows a smoother path: of the details of the readings, on every time scale,
-those that exceed what the largest of as many values of noise would be. On a scale of 2^j samples
-details are the difference of two means with the weights of a cubic spline (the starlet transform;
-J.-L. Starck, F. Murtagh, Astronomical Image and Data Analysis, 2006), so that what is kept is not
-shifted. What the largest of n values of noise is: D. L. Donoho, I. M. Johnstone, Ideal spatial
-adaptation by wavelet shrinkage, Biometrika 81 (1994). Without noise the path is that of the
-readings, to rounding.
+those that are surely more than noise; where the axis stands, more than the largest of as many
+values of noise. On a scale of 2^j samples details are the difference of two means with the weights
+of a cubic spline (the starlet transform; J.-L. Starck, F. Murtagh, Astronomical Image and Data
+Analysis, 2006), so that what is kept is not shifted. What the largest of n values of noise is:
+D. L. Donoho, I. M. Johnstone, Ideal spatial adaptation by wavelet shrinkage, Biometrika 81 (1994).
+Without noise the path is that of the readings, to rounding.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from identify.dataset.test_function import SHORTEST
 from twin.signals import Array, between
 
 FEWEST = 5  # samples that tell whether an axis stands
+SURE = 3.0  # standard deviations of noise beyond which a detail of a motion is one
 SPLINE = (1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0)  # of a cubic spline, from an end to the middle
 
 
@@ -47,7 +48,10 @@ class Path:
     @property
     def at_samples(self) -> Array:
         """(n * samples,) m/s of the path, at the log's own rate."""
-        return between(quieted(self.readings, self.noise, _scales(self.period)), self.period)
+        if self.noise == 0.0:
+            return between(self.readings, self.period)
+        sure = np.where(self._still, largest(len(self.readings)), SURE)
+        return between(quieted(self.readings, self.noise * sure, _scales(self.period)), self.period)
 
     @property
     def room(self) -> float:
@@ -56,15 +60,20 @@ class Path:
 
     @cached_property
     def stands(self) -> NDArray[np.bool_]:
-        """In which blocks (n,) all readings around lie no farther apart than by noise.
+        """In which blocks (n,) all readings around lie no farther apart than by noise."""
+        still = self._still
+        return np.asarray((still[:-1] & still[1:]).reshape(-1, self.samples).all(axis=1))
+
+    @cached_property
+    def _still(self) -> NDArray[np.bool_]:
+        """At which readings (n * samples + 1,) all around lie no farther apart than by noise.
 
         Around: within half the shortest test function, as nothing is looked at more closely.
         """
         around = max(round(SHORTEST / self.period), FEWEST) // 2
         x = np.pad(self.readings, around, mode="edge")
         span = _highest(x, 2 * around + 1) + _highest(-x, 2 * around + 1)
-        still = span < self.room
-        return np.asarray((still[:-1] & still[1:]).reshape(-1, self.samples).all(axis=1))
+        return np.asarray(span < self.room)
 
     def during(self, first: int, end: int) -> Path:
         """The same of the samples from one to another."""
@@ -76,22 +85,23 @@ class Path:
 
     def forget(self) -> None:
         """Let go of what is made of the readings."""
-        for name in ("velocity", "stands"):
+        for name in ("velocity", "stands", "_still"):
             self.__dict__.pop(name, None)
 
 
-def quieted(readings: Array, noise: float, scales: int) -> Array:
-    """Readings (n,) m less what white noise (m rms) alone may have made on so many time scales."""
-    if noise == 0.0:
-        return readings
-    mean = readings - readings[0]
-    kept, most = np.zeros(len(readings)), largest(len(readings)) * noise
+def quieted(readings: Array, most: Array, scales: int) -> Array:
+    """Readings (n,) m less details on so many time scales of which noise makes so much (n,) m.
+
+    most: of noise that is not averaged.
+    """
+    mean, out = readings - readings[0], readings.copy()
     for j, gain in enumerate(_gains(scales)):
         smooth = _smoothed(mean, 1 << j)
-        detail = mean - smooth
-        kept += np.where(np.abs(detail) > most * gain, detail, 0.0)
+        mean -= smooth
+        mean[np.abs(mean) > gain * most] = 0.0
+        out -= mean
         mean = smooth
-    return np.asarray(readings[0] + kept + mean)
+    return out
 
 
 def largest(count: int) -> float:
@@ -120,10 +130,14 @@ def _smoothed(signal: Array, apart: int) -> Array:
     """Mean (n,) of five values so many samples apart; beyond the ends are the end values."""
     n, padded = len(signal), np.pad(signal, 2 * apart, mode="edge")
     far, near, middle = SPLINE
-    out = middle * padded[2 * apart : 2 * apart + n]
-    out += near * (padded[apart : apart + n] + padded[3 * apart : 3 * apart + n])
-    out += far * (padded[:n] + padded[4 * apart :])
-    return out
+    out = middle * signal
+    beside = padded[apart : apart + n] + padded[3 * apart : 3 * apart + n]
+    beside *= near
+    out += beside
+    np.add(padded[:n], padded[4 * apart :], out=beside)
+    beside *= far
+    out += beside
+    return np.asarray(out)
 
 
 def _highest(signal: Array, samples: int) -> Array:

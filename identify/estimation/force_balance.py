@@ -155,17 +155,26 @@ def settled(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[PreparedLog]:
 
     There it is what balances the force, as far as the noise of the readings leaves room for it.
     """
-    if not any(f.effect.remembers for f in axis.effects):
+    hides = [log.motion.path.room if log.motion.path else 0.0 for log in logs]
+    if not any(f.effect.remembers for f in axis.effects) or not any(hides):
         return list(logs)
-    own = Valued.of(axis)
-    return spread(lambda log: _settled(own, log) if _matters(axis, log.motion) else log, logs)
+    own, force = Valued.of(axis), _held_over(axis, logs[int(np.argmax(hides))].motion, max(hides))
+
+    def one(log: PreparedLog) -> PreparedLog:
+        motion = log.motion
+        matters = motion.slip is None and force > QUIET * rms(motion.net)
+        return _settled(own, log) if matters else log
+
+    return spread(one, logs)
 
 
 @lru_cache(maxsize=16)  # a fit asks for the residual and its derivatives at the same values
 def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
     axis, motion = own.axis, log.motion
-    path, table, (driven, _) = motion.path, _table_between(axis), _driven(axis, log)
-    assert path is not None
+    table, (driven, _) = _table_between(axis), _driven(axis, log)
+    path = motion.path
+    if path is None:
+        return log
     acting = true_motion(axis, motion)[0]
     if _is_apart(axis):
         acting = acting.with_force(actual_force(axis, acting))
@@ -178,16 +187,13 @@ def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
     return replace(log, motion=replace(motion, slip=slip))
 
 
-def _matters(axis: AxisModel, motion: Motion) -> bool:
-    """Whether what readings hide moves laws with memory by a force that counts."""
-    if motion.path is None or not motion.path.room or motion.slip is not None:
-        return False
+def _held_over(axis: AxisModel, motion: Motion, way: float) -> float:
+    """Force (N) by which laws with memory change over so much of a way (m) from the start."""
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
-    place, moved = np.full(2, motion.position[0]), np.array([motion.path.room, 0.0])
-    then, now = (
-        force_along(own, place, v / motion.period, motion.period, *Kind) for v in (moved, 0 * moved)
-    )
-    return bool(abs(then[1] - now[1]) > QUIET * rms(motion.net))
+    moved = np.array([0.0, way, 0.0])
+    place = np.full(len(moved), motion.position[0])
+    now, _, then = force_along(own, place, moved / motion.period, motion.period, *Kind)
+    return float(abs(then - now))
 
 
 def unbalanced(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
