@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from twin.experiments.named import simulate
     from twin.importers import import_log, load_mapping
     from twin.laws.verdict import check_effect
-    from twin.logs import AxisLog, Log, read_log, recover_log, write_log
+    from twin.logs import AxisLog, Log, cut_log, read_log, recover_log, write_log
     from twin.model.file import load_model, save_model
     from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
@@ -35,7 +35,7 @@ HOMES = {
     "twin.experiments.file": ("load_experiment", "save_experiment"),
     "twin.experiments.named": ("simulate",),
     "twin.laws.verdict": ("check_effect",),
-    "twin.logs": ("AxisLog", "Log", "read_log", "recover_log", "write_log"),
+    "twin.logs": ("AxisLog", "Log", "cut_log", "read_log", "recover_log", "write_log"),
     "twin.checks": ("check_log",),
     "twin.importers": ("import_log", "load_mapping"),
     "twin.model.file": ("load_model", "save_model"),
@@ -56,6 +56,7 @@ __all__ = [
     "Parameter",
     "check_effect",
     "check_log",
+    "cut_log",
     "import_log",
     "load_catalogue",
     "load_experiment",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,17 +57,22 @@ def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
     from twin.checks import check_assumed
     from twin.importers import import_log, load_mapping
     from twin.importers.guess import doubts_of
-    from twin.importers.proposal.doubts import doubts_of_log
+    from twin.importers.proposal.doubts import told_in_log
     from twin.logs import write_log
 
     known = load_mapping(mapping)
     log = import_log(sources, known)
-    write_log(log, out)
+    unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
+    doubts = told_in_log(log)  # for whoever checks it later
+    write_log(replace(log, metadata={**log.metadata, **doubts}), out)
     answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
     resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
-    unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
-    doubts = [f"{mapping}: warning: {d}" for d in (*doubts_of(known), *doubts_of_log(log))]
-    warnings = [*resampled, *doubts, *(f"{out}: warning: {finding}" for finding in unsure)]
+    told = (*doubts_of(known), *doubts.values())
+    warnings = [
+        *resampled,
+        *(f"{mapping}: warning: {doubt}" for doubt in told),
+        *(f"{out}: warning: {finding}" for finding in unsure),
+    ]
     return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
 
 

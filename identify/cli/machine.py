@@ -113,8 +113,9 @@ def new(
 
     recorded = CheckedRecordings(logs)
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
-    read = dict(recorded)
-    model = first_model(read, out.stem, load_catalogue(), bodies, _masses(mass or ()))
+    read, known = dict(recorded), _masses(mass or ())
+    with recorded.explaining():
+        model = first_model(read, out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
@@ -190,6 +191,29 @@ def check(logs: Logs) -> Said:
     reports = check_files(logs)
     answer = check_answer(reports)
     return Said(check_text(reports), answer, fine=answer.ok)
+
+
+@app.command()
+def cut(
+    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
+    out: Annotated[Path, written("MCAP log to write.")],
+    start: Annotated[float, Option("--from", help="Where it begins, s.")] = 0.0,
+    stop: Annotated[
+        float | None, Option("--to", help="Where it ends, s; the end of LOG if left out.")
+    ] = None,
+) -> Said:
+    """Write a stretch of a log as a log of its own.
+
+    Example: twin cut run.mcap --from 1.5 --to 12 -o good.mcap
+    """
+    from identify.output.answers.machine import LogAnswer
+    from twin.logs import cut_log, read_log, write_log
+
+    made = cut_log(read_log(log), start, stop)
+    write_log(made, out)
+    answer = LogAnswer.of(log=out, samples=len(made), sample_rate=made.sample_rate)
+    text = f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {made.metadata['cut']} of {log}"
+    return Said(text, answer)
 
 
 @app.command()

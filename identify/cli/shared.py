@@ -169,6 +169,17 @@ class CheckedRecordings(Recordings):
             self.findings.append(f"{path}: {finding.severity.value}: {finding}")
         return log
 
+    @contextmanager
+    def explaining(self) -> Iterator[None]:
+        """What goes wrong with the logs meanwhile is told with what the check knows of them."""
+        try:
+            yield
+        except InputError as error:
+            known = next((f for f in self.findings if ": error: " in f), None)
+            if known is None:
+                raise
+            raise InputError(f"{known}; as it is, {error}") from error
+
 
 @dataclass(frozen=True)
 class Done(Generic[Result]):
@@ -203,7 +214,7 @@ def with_logs(
     meaningless = {"UNIT", "SWAPPED"} if model.joints else {"SIGN", "UNIT", "SWAPPED"}
     recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
-    with progress_on_stderr() as progress, left_out() as silent:
+    with progress_on_stderr() as progress, left_out() as silent, recorded.explaining():
         result = job(model, recorded, *rest, progress=progress)
     return Done(result, recorded.findings, list(dict.fromkeys(silent)))  # of all axes alike
 

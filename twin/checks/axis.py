@@ -54,11 +54,15 @@ class Axis:
 
     @cached_property
     def position_step(self) -> float:
-        """Smallest change of the position in m; for a coarse encoder its count."""
+        """Smallest change of the position in m, its count; 0 where none shows."""
         steps = np.abs(np.diff(self.log.position))
         rounding = 4.0 * np.finfo(float).eps * float(np.abs(self.log.position).max())
         steps = steps[steps > rounding]  # less is made by units and gears, and none of the encoder
         least = float(steps.min()) if len(steps) else 0.0
+        rests = 0.05  # part of the samples that repeat the one before, as of a reading in steps
+        repeated = len(self.log) - 1 - len(steps) > rests * len(self.log)
+        if not (repeated or _are_whole(steps, least)):
+            least = 0.0
         return least if self.position_held else max(count_of(self.log.position), least)
 
     @cached_property
@@ -236,14 +240,13 @@ class Axis:
 
     @property
     def pushed_back(self) -> bool:
-        """Whether force and acceleration are opposed in each part of the log that tells it.
+        """Whether force and acceleration are opposed in each third of the log that tells it.
 
         What the check does not know, such as a joint that another moves, may oppose them in all.
         """
-        parts = np.array_split(np.arange(len(self.force)), 3)  # of the log, of which two may agree
         fits = (
             fit_dynamics(self.force[p], self.regressors[p], self.kept[p], 0, self.rare)
-            for p in parts
+            for p in np.array_split(np.arange(len(self.force)), 3)
         )
         masses = [fit.mass for fit in fits if fit.mass is not None and fit.mass_matters]
         return max(masses, default=-1.0) < 0.0
@@ -354,6 +357,13 @@ def _usual_about(sizes: Array, at: NDArray[np.bool_], reach: int) -> Array:
     places = np.flatnonzero(at)
     first = np.clip(places - reach, 0, max(len(sizes) - 2 * reach - 1, 0))
     return np.array([np.median(sizes[k : k + 2 * reach + 1]) for k in first])
+
+
+def _are_whole(steps: Array, least: float) -> bool:
+    """Whether steps are whole ones of the least; a motion that never rests has any."""
+    few = steps[steps < 20.0 * least]  # of more, rounding adds up
+    off = np.abs(few / (least or 1.0) - np.round(few / (least or 1.0)))
+    return len(few) >= 5 and float(np.mean(off < 0.05)) > 0.9  # as of the ways of ``count_of``
 
 
 def count_of(signal: Array) -> float:

@@ -173,7 +173,7 @@ def _finding(axis: Axis, fault: Fault, found: list[Break]) -> LogFinding:
     }[fault]
     remedy = {
         Fault.MISSING: "import the file with its time stamps, or cut the log there",
-        Fault.WRAPPED: f"add {size} behind each wrap before the import",
+        Fault.WRAPPED: f"add {size} behind each wrap before the import, as wraps does in a map",
         Fault.OUTLIERS: "repair these samples, or cut the log there",
         Fault.JOINED: "import each part as a log of its own",
         Fault.UNEVEN: "record with the drive's own clock",

@@ -17,6 +17,7 @@ from twin.signals import Array, stretches
 # Whoever knows it to be right takes the word away.
 ASSUMED = "ASSUMED"
 MAP = "import_map"  # entry of a log's metadata: the map as it was written
+DOUBT = "doubt."  # the same of an axis, "doubt.x.0": what its signals say against the map
 COUNTER = "counter."  # such an entry of an axis' signal, "counter.x.current": that it begins again
 _TABLE = re.compile(r"\[axes\.\"?(\w+)\"?\]")
 _ENTRY = re.compile(r"(\w+)\s*=\s*([^#]*)#(.*)")
@@ -49,7 +50,7 @@ def check_content(axis: Axis) -> Iterator[LogFinding]:
 
 def _unchanging(axis: Axis) -> Iterator[LogFinding]:
     """Readings that are one value: of an axis at rest, of a constant force, of a dead channel."""
-    columns, kind = axis.log.columns, axis.log.kind
+    columns = axis.log.columns
     flat = {n: c[0] for n, c in columns.items() if len(c) and np.all(c == c[0])}
     told = {
         n: f"{n} is {flat[n]:.6g} {axis.log.units[n]} throughout" for n in READINGS if n in flat
@@ -61,13 +62,7 @@ def _unchanging(axis: Axis) -> Iterator[LogFinding]:
         return
     driving = "force" if "force" in columns else "current"
     if flat.get(driving):
-        yield axis.warning(
-            Fault.FLAT,
-            f"{told.pop(driving)}: with no other force the {kind.mass_name} and the friction are "
-            "not told apart, only what they are to each other and to that force",
-            "add logs of other forces; if it was no constant force, check that the channel was "
-            "connected and mapped",
-        )
+        yield axis.warning(Fault.FLAT, *_shared(axis, told.pop(driving)))
     for name, what in told.items():
         spoils = name in (driving, "velocity")
         tell = axis.error if spoils else axis.warning
@@ -113,6 +108,9 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding
             size = what.rpartition(" ")[2]
             remedy = f"give wraps = {size} for its {field} in the map and import again"
             yield LogFinding(Severity.ERROR, Fault.WRAPPED, axis, what, WHOLE, remedy)
+        if key.startswith(f"{DOUBT}{axis}."):
+            said, _, remedy = what.partition(": ")[2].rpartition("; ")
+            yield LogFinding(Severity.WARNING, Fault.ASSUMED, axis, said, WHOLE, remedy)
     if found := assumptions(metadata.get(MAP, ""), axis):
         yield LogFinding(
             Severity.WARNING, Fault.ASSUMED, axis,
@@ -135,6 +133,7 @@ def check_excitation(axis: Axis) -> Iterator[LogFinding]:
             "move it, or leave it out of the fit",
         )
         return
+    yield from _constant(axis)
     yield from _directions(axis)
     share = axis.dynamics.inertial_share
     # share of the force, below which friction that the check does not know hides it
@@ -152,13 +151,34 @@ def check_excitation(axis: Axis) -> Iterator[LogFinding]:
     rounded = axis.position_white < axis.position_step  # noise of rounding is at most its step
     # as a part of the acceleration; rounding is no noise and does not average out
     if noise >= (0.05 if rounded else 0.3) * rms:
+        step = f"its smallest change is {axis.position_step:.2g} {unit}" * bool(axis.position_step)
         yield axis.warning(
             Fault.COARSE_POSITION,
-            f"the position is good to {axis.position_noise:.2g} {unit} rms (its smallest change is "
-            f"{axis.position_step:.2g} {unit}), which over {axis.smoother.length * 1e3:.2g} ms "
-            f"makes {noise:.2g} of the {rms:.2g} {axis.log.kind.acceleration} seen",
+            f"the position is good to {axis.position_noise:.2g} {unit} rms"
+            f"{f' ({step})' * bool(step)}, which over {axis.smoother.length * 1e3:.2g} ms makes "
+            f"{noise:.2g} of the {rms:.2g} {axis.log.kind.acceleration} seen",
             "use a finer encoder or a livelier motion",
         )
+
+
+def _constant(axis: Axis) -> Iterator[LogFinding]:
+    """A force that is one value but for its noise, which a mass and its friction share."""
+    noise, spread = axis.smoother.held_noise(axis.force_noise), float(np.std(axis.force))
+    level = float(np.median(axis.log.force))
+    of_noise, of_level = 3.0, 0.01  # times the noise, or that part of the level, is no excitation
+    if spread < min(of_noise * noise, of_level * abs(level)):
+        what = f"force is {level:.3g} {axis.log.kind.force} throughout but for noise"
+        yield axis.warning(Fault.WEAK_EXCITATION, *_shared(axis, what))
+
+
+def _shared(axis: Axis, what: str) -> tuple[str, str]:
+    """What a constant force does not tell, and the remedy."""
+    return (
+        f"{what}: with no other force the {axis.log.kind.mass_name} and the friction are not told "
+        "apart, only what they are to each other and to that force",
+        "add logs of other forces; if it was no constant force, check that the channel was "
+        "connected and mapped",
+    )
 
 
 def _directions(axis: Axis) -> Iterator[LogFinding]:

@@ -109,10 +109,14 @@ def _filled(draft: Any, seconds: float, length: Length) -> Any:
 
 @dataclass(frozen=True)
 class Named:
-    """A named experiment. make: (model, name of the axis, duration s) -> Experiment."""
+    """A named experiment. make: (model, name of the axis, duration s) -> Experiment.
+
+    of_one_axis: whether it moves one of them, and not all.
+    """
 
     summary: str
     make: Callable[[MachineModel, str, float], Experiment]
+    of_one_axis: bool = True
 
 
 def _limit(model: MachineModel, axis: str) -> Limits:
@@ -149,11 +153,12 @@ def _multisine(model: MachineModel, axis: str, duration: float) -> Experiment:
 
 
 EXPERIMENTS: Mapping[str, Named] = {
-    "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration)),
+    "tracking": Named(Tracking.summary, lambda model, axis, duration: Tracking(duration), False),
     "moves": Named(
         Moves.summary,
         # a move every 0.1 s or so
         lambda model, axis, duration: Moves(max(int(duration / 0.1), 2), duration=duration),
+        of_one_axis=False,
     ),
     "cable_pass": Named("one axis back and forth at 0.1 m/s over the travel", _cable_pass),
     "velocity_map": Named(Staircase.summary, _velocity_map),
@@ -186,6 +191,16 @@ def find_experiment(
         model.axis(axis)
     require_length(duration, model.sample_rate)
     return EXPERIMENTS[name].make(model, axis or next(iter(model.axes)), duration)
+
+
+def _require_of_one_axis(name: str, model: MachineModel, axis: str) -> None:
+    """Refuse an axis for an experiment that moves all."""
+    if len(model.axes) > 1 and name in EXPERIMENTS and not EXPERIMENTS[name].of_one_axis:
+        alone = ", ".join(n for n, one in EXPERIMENTS.items() if one.of_one_axis)
+        raise InputError(
+            f"axis {axis}: {name} moves all axes ({', '.join(model.axes)}); leave the axis out, or "
+            f"take one of {alone}"
+        )
 
 
 def simulate(
@@ -228,6 +243,8 @@ def simulate_parts(
     _, noise_rng, current_rng = np.random.default_rng(seed).spawn(3)
     if isinstance(experiment, str):
         name, attached = experiment, dict[str, bytes]()
+        if axis is not None:
+            _require_of_one_axis(name, model, axis)
         seconds = DURATION if duration is None else duration
         chosen = find_experiment(experiment, model, axis, seconds)
     else:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -164,6 +164,8 @@ def propose(path: Path) -> Proposal:
 def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
     """What is proposed for an axis of these columns."""
     axis = with_position(file, Axis(name, tuple(columns)))
+    if (position := axis.signals.get("position")) is not None:
+        axis = replace(axis, comes_round=file.column(position.name).wraps is not None)
     if "position" not in axis.signals:
         return axis.asking({"force": f"axis {name}: {_NO_MOTION}"})
     return exchanged(file, with_force(file, with_setpoints(file, with_rates(file, axis))))

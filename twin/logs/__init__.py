@@ -1,5 +1,6 @@
 """Logs: columns with units, the MCAP codec, recovery of damaged ones."""
 
+from twin.logs.cut import cut_log
 from twin.logs.decode import GivenLogs, logs_by_name, read_log
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
 from twin.logs.recover import Recovery, recover_file, recover_log
@@ -13,6 +14,7 @@ __all__ = [
     "GivenLogs",
     "Log",
     "Recovery",
+    "cut_log",
     "logs_by_name",
     "read_log",
     "record_log",

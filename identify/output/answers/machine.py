@@ -270,6 +270,7 @@ class ExportAnswer(Answer):
     kept: dict[str, list[str]]
     approximated: list[RemarkEntry]
     lost: list[RemarkEntry]
+    taken_out: list[RemarkEntry]
 
 
 class OutdatedEntry(Entry):

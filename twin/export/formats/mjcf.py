@@ -12,7 +12,8 @@ Where a DC motor of MuJoCo drives the joint, that motor holds LuGre friction as 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,22 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
         for moved in (j for j in spec.joints if j.name not in model.joints.values()):
             text = with_joint(text, moved.name, _changed(moved, {}))
     held = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
+    held = {
+        axis: replace(found, taken_out=tuple(_taken_out(spec, axis, model.axes[axis])))
+        for axis, found in held.items()
+    }
     return Exported({f"{Path(name).stem}.xml": text}, held)
+
+
+def _taken_out(spec: Any, axis: str, own: AxisModel) -> Iterator[Remark]:
+    """What the file has of a joint or tendon, and the model has not."""
+    joint, wanted = own.joint or axis, attributes_of(own)
+    there = spec.joint(joint) or spec.tendon(joint)
+    for key in PASSIVE:
+        value = float(np.ravel(getattr(there, key))[0])
+        if value != 0.0 and not wanted.get(key):
+            text = f"{value:g} of the file is taken out, as no effect of the model is it"
+            yield Remark(axis, key, text)
 
 
 def attributes_of(axis: AxisModel) -> dict[str, float]:

@@ -18,18 +18,30 @@ def motion_of_force(axis: AxisLog) -> Explained | None:
 
 def doubts_of_log(log: Log) -> Iterator[str]:
     """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each."""
-    for name, axis in log.axes.items():
-        found = _columns(axis)
-        if found is None:
-            continue
-        position, force = found
-        motion = explained(position.short, [force.short])[0]
-        sign = sign_of(motion, position, force)
-        yield from (f"axes.{name}: {what}" for what in _of_force(motion, sign))
-        if (goal := axis.columns.get("setpoint_position")) is not None:
-            setpoint = Column("setpoint_position", goal)
-            said = _of_setpoint(position, setpoint, force, sign)
-            yield from (f"axes.{name}: {what}" for what in said)
+    return (doubt for name, axis in log.axes.items() for doubt in _of_axis(name, axis))
+
+
+def told_in_log(log: Log) -> dict[str, str]:
+    """The same as entries of the log's metadata, "doubt.x.0", which a check reads."""
+    return {
+        f"doubt.{name}.{number}": doubt
+        for name, axis in log.axes.items()
+        for number, doubt in enumerate(_of_axis(name, axis))
+    }
+
+
+def _of_axis(name: str, axis: AxisLog) -> Iterator[str]:
+    found = _columns(axis)
+    if found is None:
+        return
+    position, force = found
+    motion = explained(position.short, [force.short])[0]
+    sign = sign_of(motion, position, force)
+    yield from (f"axes.{name}: {what}" for what in _of_force(motion, sign))
+    if (goal := axis.columns.get("setpoint_position")) is not None:
+        setpoint = Column("setpoint_position", goal)
+        said = _of_setpoint(position, setpoint, force, sign)
+        yield from (f"axes.{name}: {what}" for what in said)
 
 
 def _columns(axis: AxisLog) -> tuple[Column, Column] | None:
@@ -49,7 +61,7 @@ def _of_force(motion: Explained, sign: int) -> Iterator[str]:
     elif motion.pushes:
         yield (
             "the force helps the motion where friction resists it (negative friction); a part of "
-            "the command is missing in this column, such as its feedforward: map the whole force"
+            "the command is missing in this column, such as its feedforward; map the whole force"
         )
 
 

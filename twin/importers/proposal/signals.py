@@ -47,7 +47,7 @@ class Axis:
     signals: by field. asked: by field, what is needed where the columns do not tell. not_used: by
     column, why not. twins: columns that go as the position and are as large, but no setpoint by
     their course. motion: what the motion explains of the force or current, None without one.
-    sign: -1 where that is reversed.
+    sign: -1 where that is reversed. comes_round: whether its position is one within a turn.
     """
 
     name: str
@@ -58,6 +58,7 @@ class Axis:
     twins: tuple[Name, ...] = ()
     motion: Explained | None = None
     sign: int = 1
+    comes_round: bool = False
 
     def having(self, *signals: Signal) -> Axis:
         """The same with these signals too."""

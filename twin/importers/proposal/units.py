@@ -42,7 +42,7 @@ def turns(axis: Axis) -> bool:
                 return True
             if is_unit(unit, LINEAR_UNITS[field]):
                 return False
-    return any(TURNING & set(words_of(s.column)) for s in axis.signals.values())
+    return axis.comes_round or any(TURNING & set(words_of(s.column)) for s in axis.signals.values())
 
 
 def moves_straight(axis: Axis) -> bool:
