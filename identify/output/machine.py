@@ -35,7 +35,8 @@ def export_text(made: Exported) -> str:
     lines = []
     for axis, kept in made.kept.items():
         lines.append(f"axis {axis}: keeps {', '.join(kept) or 'nothing'}")
-        for word, remarks in (("nearly", made.approximated), ("lost", made.lost)):
+        kinds = {"nearly": made.approximated, "lost": made.lost, "in the file": made.written}
+        for word, remarks in kinds.items():
             lines += [f"  {word}: {r.part}, {r.text}" for r in remarks if r.axis == axis]
     return "\n".join(lines)
 
