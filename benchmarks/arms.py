@@ -105,16 +105,22 @@ def _carried(arm: Arm, joint: int) -> float:
 def told_of(found: Diagnosis) -> list[tuple[tuple[Told, ...], float, str]]:
     """Each answer with those tied with it, how sure it is stated, and its values in words."""
     out = list[tuple[tuple[Told, ...], float, str]]()
-    if (body := found.body) is not None:
-        names = tuple((BODY, name) for name in (body.body, *body.tied))
+    for body in found.bodies:
+        names = tuple(_placed(name, BODY) for name in (body.body, *body.tied))
         mass, band = body.change[0], body.band[0]
         out.append((names, body.confidence, f"{mass:.3f} ± {band:.3f} kg"))
     for axis, own in found.axes.items():
         for f in own.findings:
             values = ", ".join(f"{k} {v:.3g}" for k, v in f.parameters.items())
-            names = tuple((name, axis) for name in (f.effect, *f.tied))
+            names = tuple(_placed(name, "", axis) for name in (f.effect, *f.tied))
             out.append((names, f.confidence or 0.0, values))
     return out
+
+
+def _placed(name: str, what: str, axis: str = "") -> Told:
+    """An answer of words: "rotor_inertia of joint1", a body, or an effect of an axis."""
+    effect, of, place = name.partition(" of ")
+    return (effect, place) if of else (what, name) if what else (name, axis)
 
 
 def judged(own: Machine) -> dict[str, Any]:
@@ -152,11 +158,11 @@ def _friction_found(own: Machine, found: Diagnosis, joint: str) -> bool:
 
 def _payload(own: Machine, found: Diagnosis) -> tuple[float, float] | None:
     """Error of a payload's mass that was found, over its mass and over its band."""
-    body = found.body
-    if not own.changed.payload or body is None or body.body != own.arm.links[-1]:
+    last = [body for body in found.bodies if body.body == own.arm.links[-1]]
+    if not own.changed.payload or not last or not np.isfinite(last[0].band[0]):
         return None
-    off = abs(float(body.change[0]) - own.changed.payload)
-    return off / own.changed.payload, off / float(body.band[0])
+    off = abs(float(last[0].change[0]) - own.changed.payload)
+    return off / own.changed.payload, off / float(last[0].band[0])
 
 
 def _words(answer: tuple[tuple[Told, ...], float, str]) -> str:

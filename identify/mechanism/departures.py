@@ -1,0 +1,185 @@
+"""What of a mechanism has to move away from its file, before any effect of a single joint is asked.
+
+The bodies that must move are corrected in the datasets of all joints. Of rotors, torque constants,
+friction with load and springs a diagnosis of a joint may name those that must move there, and no
+others: as a joint alone they imitate each other and the bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Errors, Fit, fit_axis
+from identify.estimation.intervals import half_widths_by
+from identify.mechanism.bodies import Body, WrongBody
+from identify.mechanism.choice import Choice, Moved
+from identify.mechanism.groups import EFFECTS, Group, What, groups_of
+from identify.mechanism.regression import Regression, regression_of
+from identify.selection.acceptance import Judged
+from identify.selection.diagnosis import AxisDiagnosis
+from twin.effects import Catalogue
+from twin.model.machine import MachineModel
+from twin.parallel import Progress, silent
+from twin.signals import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Departures:
+    """What must move, and the joints beside the bodies as they were found.
+
+    asked: whether the joints are those of a mechanism, and more than noise is left of them.
+    """
+
+    datasets: Mapping[str, Dataset]
+    fits: Mapping[str, Fit]
+    moved: Sequence[Moved] = ()
+    bodies: tuple[WrongBody, ...] = ()
+    asked: bool = False
+
+    def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
+        """The effects that a diagnosis of that axis may name."""
+        if not self.asked:
+            return catalogue
+        own = {m.group.what for m in self.moved if m.group.axis == axis}
+        barred = {name for what, names in EFFECTS.items() if what not in own for name in names}
+        return Catalogue([e for e in catalogue.values() if e.name not in barred])
+
+    def with_ties(self, found: AxisDiagnosis) -> AxisDiagnosis:
+        """The diagnosis of an axis, with what of other joints explains as much as a finding."""
+        also = {
+            name: tuple(group.told for group in m.tied)
+            for m in self.moved
+            if m.group.axis == found.dataset.axis
+            for name in EFFECTS.get(m.group.what, ())
+        }
+        findings = tuple(
+            replace(f, tied=tuple(dict.fromkeys((*f.tied, *also.get(f.effect, ())))))
+            for f in found.findings
+        )
+        return replace(found, findings=findings)
+
+
+def departures_of(
+    model: MachineModel,
+    fits: Mapping[str, Fit],
+    datasets: Mapping[str, Dataset],
+    progress: Progress = silent,
+) -> Departures:
+    """What must move away from the file of a mechanism.
+
+    fits, datasets: of the axes that move. Of long logs the beginnings tell it. Nothing is asked
+    where only noise is left of every joint.
+    """
+    nothing = Departures(datasets, fits)
+    if not model.joints:
+        return nothing
+    before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
+    if all(judged.at_floor for judged in before.values()):
+        return nothing
+    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
+
+    mechanism = mechanism_in(model)
+    bodies = [Body(mechanism, mechanism.axes.index(axis)) for axis in before]
+    progress("bodies, rotors and motors of all joints", 0, 1)
+    axes = {axis: judged.fit.axis for axis, judged in before.items()}
+    reaches = {axis: _reach(judged.dataset) for axis, judged in before.items()}
+    regression = regression_of(before, groups_of(bodies, axes, reaches))
+    for body in bodies:
+        body.forget()
+    moved = Choice(regression).moved()
+    return _with_bodies(replace(nothing, moved=moved, asked=True), regression)
+
+
+def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:
+    part = dataset.part
+    return Judged(fit if part is dataset else _refitted(fit, part), part)
+
+
+def _refitted(fit: Fit, dataset: Dataset) -> Fit:
+    return replace(fit_axis(fit.axis, dataset.training), begun=fit.begun)
+
+
+def _reach(dataset: Dataset) -> tuple[float, float]:
+    ends = [log.extent[1] for log in dataset.training]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def _with_bodies(found: Departures, regression: Regression) -> Departures:
+    """With the bodies that moved corrected in the datasets, and the joints refitted beside them."""
+    own = [m for m in found.moved if m.group.what is What.BODY]
+    if not own:
+        return found
+    told = _Told.of(regression, [m.group for m in found.moved])
+    datasets = dict(found.datasets)
+    for m in own:
+        assert m.group.body is not None
+        change = told.changes[m.group.name]
+        datasets = {a: m.group.body.corrected(d, change) for a, d in datasets.items()}
+    fits = {a: _refitted(found.fits[a], d) for a, d in datasets.items()}
+    errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
+    bodies = tuple(_told_of(m, told, errors) for m in own)
+    return replace(found, datasets=datasets, fits=fits, bodies=bodies)
+
+
+def _told_of(moved: Moved, told: _Told, errors: Mapping[str, Errors]) -> WrongBody:
+    body, name = moved.group.body, moved.group.name
+    assert body is not None
+    return WrongBody(
+        body=name,
+        axis=body.axis,
+        tied=tuple(group.name for group in moved.tied),
+        axes=tuple(axis for axis in body.axes if axis in errors),
+        inertial=body.inertial,
+        change=told.changes[name],
+        band=told.bands[name],
+        score=moved.score,
+        errors=errors,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What a regression tells of bodies, by name: changes (10,), half their 90 % bands (10,)."""
+
+    changes: Mapping[str, Array] = field(default_factory=dict)
+    bands: Mapping[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
+        """Beside all that moved, and the torque constants of all joints, which no file knows well.
+
+        The bands are by the scatter between stretches of time, of all joints together.
+        """
+        groups = regression.groups
+        asked = [i for i, g in enumerate(groups) if g in moved or g.what is What.GAIN]
+        found = regression.feasible(asked)
+        left, _ = regression.left(found)
+        where = np.concatenate(
+            [np.arange(regression.base.stop), *(_range(regression.spans[i]) for i in asked)]
+        )
+        columns = regression.training.columns[:, where]
+        changes, bands = {}, {}
+        for i in (i for i in asked if groups[i].what is What.BODY):
+            span = regression.spans[i]
+            changes[groups[i].name] = found.values[span]
+            at = np.flatnonzero(np.isin(where, _range(span)))
+            weights = np.zeros((len(where), len(at)))
+            weights[at, np.arange(len(at))] = 1.0
+            band = half_widths_by(columns.copy(), left, weights)
+            known = regression.known_by_data(asked, span)
+            bands[groups[i].name] = np.where(known, band, np.nan)
+        return cls(changes, bands)
+
+
+def _range(span: slice) -> Array:
+    return np.arange(span.start, span.stop)
+
+
+def _errors(before: Fit, given: Dataset, after: Fit, found: Dataset) -> Errors:
+    """Of one axis without and with what was found, on the logs that are reported."""
+    first, second = (Errors.of(f, f, d, d.tested_on) for f, d in ((before, given), (after, found)))
+    return replace(first, after=second.after)
