@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -191,18 +191,26 @@ def possible(found: Array, information: Array, bodies: Sequence[Array], most: in
     """
     if all(_is_possible(own) for own in np.split(found, len(bodies))):
         return found
-    from scipy.optimize import least_squares  # SciPy takes long to load
+    from scipy.linalg import block_diag  # SciPy takes long to load
+    from scipy.optimize import least_squares
 
     power, axes = np.linalg.eigh(information)
     root = (axes * np.sqrt(np.maximum(power, 0.0))).T
     begun = np.concatenate([_triangle(own) for own in bodies])
     size = np.maximum(np.abs(begun), 1e-3 * np.abs(begun).max())  # of zeros of the triangle
+    squares = _squares()
 
-    def all_of(lower: Array) -> Array:
-        return np.concatenate([_inertial(own) for own in np.split(lower * size, len(bodies))])
+    def left(x: Array) -> Array:
+        """By how much the parameters are others than those found, in units of the fit's noise."""
+        each = np.split(x * size, len(bodies))
+        return root @ (np.concatenate([own @ squares @ own for own in each]) - found)
 
-    done = least_squares(lambda x: root @ (all_of(x) - found), begun / size, max_nfev=most)
-    return all_of(done.x)
+    def slopes(x: Array) -> Array:
+        each = [2.0 * squares @ own for own in np.split(x * size, len(bodies))]
+        return root @ block_diag(*each) * size
+
+    done = least_squares(left, begun / size, slopes, max_nfev=most)
+    return np.concatenate([_inertial(own) for own in np.split(done.x * size, len(bodies))])
 
 
 LOWER = np.tril_indices(4)
@@ -231,6 +239,15 @@ def _triangle(inertial: Array) -> Array:
     power, axes = np.linalg.eigh(matrix)
     least = 1e-6 * float(np.trace(matrix))  # of bodies whose file has them flat
     return np.linalg.cholesky((axes * np.maximum(power, least)) @ axes.T)[LOWER]
+
+
+@cache
+def _squares() -> Array:
+    """The parameters of a body as quadratic forms (10, 10, 10) of its triangle."""
+    unit = np.eye(10)
+    alone = np.array([_inertial(e) for e in unit])
+    pairs = np.array([[_inertial(a + b) for b in unit] for a in unit])
+    return np.moveaxis(0.5 * (pairs - alone[:, None] - alone[None]), -1, 0)
 
 
 def _inertial(lower: Array) -> Array:

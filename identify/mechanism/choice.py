@@ -2,13 +2,13 @@
 
 Sets of groups are grown from the best of each size, by Schwarz's criterion; bodies have what a body
 can have. Of the best set each group has to be accepted beside all others of it. What stands in the
-place of one in another set that explains as much is told with it: a body that is felt at one joint
-alone is a rotor there, and a torque constant what all weights of its joint have in common.
+place of one in the best set without it, where that explains as much, is told with it: a body that
+is felt at one joint alone is a rotor there, and a torque constant what all weights of its joint have
+in common.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ import numpy as np
 from identify.mechanism.groups import Group
 from identify.mechanism.regression import Regression, Rows, Solution
 from identify.rules import RULE
-from identify.selection.acceptance import Score, least_t
+from identify.selection.acceptance import Score
 from identify.estimation.residual_noise import SHIFTS
 from twin.signals import Array
 
@@ -50,6 +50,14 @@ class Choice:
     def _known(self) -> dict[Chosen, Solution]:
         return {}
 
+    @cached_property
+    def _controls(self) -> dict[tuple[int, Chosen], float]:
+        return {}
+
+    @cached_property
+    def _rough(self) -> dict[Chosen, float]:
+        return {}
+
     def solution(self, chosen: Chosen) -> Solution:
         """With values that are possible."""
         if chosen not in self._known:
@@ -62,52 +70,67 @@ class Choice:
 
     def moved(self) -> list[Moved]:
         """The groups that must move, those that explain most first."""
-        best = self._needed(self._grown())
+        best = self._real(self._grown())
         found = [self._moved(g, best) for g in best]
         return sorted(found, key=lambda m: -m.score.part)
 
-    def _grown(self) -> Chosen:
-        """The best set of all that were grown."""
-        every = range(len(self.regression.groups))
+    def _grown(self, barred: Chosen = frozenset()) -> Chosen:
+        """The best set of all that were grown; barred: groups that are in none."""
+        every = frozenset(range(len(self.regression.groups))) - barred
         layer: list[Chosen] = [frozenset()]
         best = layer[0]
         for _ in range(MOST):
-            larger = {own | {g} for own in layer for g in every if g not in own}
-            rough = {own: self._roughly(own) for own in larger}
-            first = sorted(larger, key=lambda own: rough[own])[: 2 * WIDE]
+            larger = {own | {g} for own in layer for g in every - own}
+            first = sorted(larger, key=self._roughly)[: 2 * WIDE]
             layer = sorted(first, key=self.criterion)[:WIDE]
-            if self.criterion(layer[0]) >= self.criterion(best):
+            if not layer or self.criterion(layer[0]) >= self.criterion(best):
                 break
             best = layer[0]
+            if self._is_noise(best):
+                break
         return best
+
+    def _is_noise(self, chosen: Chosen) -> bool:
+        """Whether a set leaves noise alone, so that nothing beside it can be needed."""
+        return self.regression.is_noise(self.solution(chosen))
 
     def _roughly(self, chosen: Chosen) -> float:
         """What speaks against a set, whether its values are possible or not."""
-        return self.regression.criterion(self.regression.solved(chosen))
+        if chosen not in self._rough:
+            self._rough[chosen] = self.regression.criterion(self.regression.solved(chosen))
+        return self._rough[chosen]
 
     def _needed(self, chosen: Chosen) -> Chosen:
         """The set less what is not accepted beside the rest of it, the weakest first."""
         scores = {g: self._score(g, chosen) for g in chosen}
-        refused = {g: s for g, s in scores.items() if not s.accepted}
-        if not refused:
-            refused = {g: s for g, s in self._beside_controls(scores, chosen) if not s.accepted}
+        refused = {
+            g: s for g, s in scores.items() if not s.accepted or self._is_noise(chosen - {g})
+        }
         if not refused:
             return chosen
         return self._needed(chosen - {min(refused, key=lambda g: refused[g].part)})
+
+    def _real(self, chosen: Chosen) -> Chosen:
+        """The same less what takes no more than its controls."""
+        chosen = self._needed(chosen)
+        scores = {g: self._with_control(g, chosen) for g in chosen}
+        refused = {g: s for g, s in scores.items() if not s.accepted}
+        if not refused:
+            return chosen
+        return self._real(chosen - {min(refused, key=lambda g: refused[g].part)})
 
     def _score(self, g: int, chosen: Chosen) -> Score:
         """What a group takes beside the others of a set."""
         among = len(self.regression.groups)
         return self.regression.score(self.solution(chosen - {g}), self.solution(chosen), among)
 
-    def _beside_controls(
-        self, scores: dict[int, Score], chosen: Chosen
-    ) -> Iterator[tuple[int, Score]]:
-        for g, score in scores.items():
-            yield g, replace(score, control=self._control(g, chosen))
+    def _with_control(self, g: int, chosen: Chosen) -> Score:
+        return replace(self._score(g, chosen), control=self._control(g, chosen))
 
     def _control(self, g: int, chosen: Chosen) -> float:
         """The part that all but one in twenty of a group's controls take: shifted in time."""
+        if (g, chosen) in self._controls:
+            return self._controls[g, chosen]
         count, parts = round(1.0 / RULE.chance), []
         span = self.regression.spans[g]
         without = self.solution(chosen - {g})
@@ -119,26 +142,22 @@ class Choice:
             )
             false = replace(self.regression, training=training, other=other)
             parts.append(false.score(without, false.solved(chosen)).part)
-        return float(np.quantile(parts, 1.0 - RULE.chance, method="inverted_cdf"))
+        most = float(np.quantile(parts, 1.0 - RULE.chance, method="inverted_cdf"))
+        return self._controls.setdefault((g, chosen), most)
 
     def _moved(self, g: int, chosen: Chosen) -> Moved:
         found = self.solution(chosen)
-        ((_, score),) = self._beside_controls({g: self._score(g, chosen)}, chosen)
+        score = self._with_control(g, chosen)
         others = self.regression.groups
         tied = tuple(others[r] for r in self._in_its_place(g, chosen))
         return Moved(others[g], tied, found.values[self.regression.spans[g]], score)
 
     def _in_its_place(self, g: int, chosen: Chosen) -> list[int]:
-        """The groups that explain as much in the place of one, those that explain most first."""
-        rest = chosen - {g}
-        rivals = [r for r in range(len(self.regression.groups)) if r not in chosen]
-        alike = [r for r in rivals if self._is_as_good(rest | {r}, chosen)]
-        return sorted(alike, key=lambda r: self.criterion(rest | {r}))
-
-    def _is_as_good(self, one: Chosen, best: Chosen) -> bool:
-        """Whether the logs do not clearly prefer the best set to another."""
-        by = self.regression.score(self.solution(one), self.solution(best))
-        return by.part < RULE.least_part or by.t < least_t(1)
+        """The groups that explain as much in the place of one, in the best set without it."""
+        other = self._needed(self._grown(frozenset({g})))
+        if self.criterion(other) > self.criterion(chosen) + RULE.least_bic:
+            return []
+        return sorted(other - chosen)
 
 
 def _shifted(rows: Rows, span: slice, rng: np.random.Generator) -> Rows:

@@ -150,13 +150,15 @@ class _Told:
 
     @classmethod
     def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
-        """Beside all that moved, and the torque constants of all joints, which no file knows well.
+        """Beside all that moved, and the torque constants of all joints where the logs ask for them.
 
         The bands are by the scatter between stretches of time, of all joints together.
         """
-        groups = regression.groups
-        asked = [i for i, g in enumerate(groups) if g in moved or g.what is What.GAIN]
-        found = regression.feasible(asked)
+        regression, groups = _with_gains(regression), regression.groups
+        alone = [i for i, g in enumerate(groups) if g in moved]
+        gains = [i for i, g in enumerate(groups) if g.what is What.GAIN and g not in moved]
+        tried = [(own, regression.feasible(own)) for own in (alone, [*alone, *gains])]
+        asked, found = min(tried, key=lambda pair: regression.criterion(pair[1]))
         left, _ = regression.left(found)
         where = np.concatenate(
             [np.arange(regression.base.stop), *(_range(regression.spans[i]) for i in asked)]
@@ -173,6 +175,14 @@ class _Told:
             known = regression.known_by_data(asked, span)
             bands[groups[i].name] = np.where(known, band, np.nan)
         return cls(changes, bands)
+
+
+def _with_gains(regression: Regression) -> Regression:
+    """The regression whose torque constants are known as well as files and papers know them."""
+    accuracy = 0.1  # relative: two papers of one machine, by its makers, differ by as much
+    known = np.full(1, accuracy)
+    groups = [replace(g, scale=known) if g.what is What.GAIN else g for g in regression.groups]
+    return replace(regression, groups=groups)
 
 
 def _range(span: slice) -> Array:

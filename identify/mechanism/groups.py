@@ -42,7 +42,6 @@ EFFECTS = {
     What.CURVE: ("spring", "gravity", "cable_slab"),
 }
 ORDER = 3  # of the curve of a joint's angle
-ACCURACY = 0.1  # relative, of torque constants: two papers of one machine differ by as much
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def groups_of(
         out += [
             Group(What.BODY, axis, body.scale, np.full(len(INERTIAL), -np.inf), body),
             Group(What.ROTOR, axis, unknown, np.array([-rotor])),
-            Group(What.GAIN, axis, np.full(1, ACCURACY), free),
+            Group(What.GAIN, axis, unknown, free),
             Group(What.LOAD, axis, unknown, np.zeros(1)),
             Group(
                 What.CURVE, axis, np.full(ORDER, np.inf), np.full(ORDER, -np.inf),

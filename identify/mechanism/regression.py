@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import blocks_of, effective_samples, rms
 from identify.estimation.force_balance import jacobian
-from identify.estimation.least_squares import RIDGE
+from identify.estimation.least_squares import RIDGE, ROUNDING
 from identify.mechanism.bodies import possible
 from identify.mechanism.groups import Group, What
+from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, taken
 from twin.signals import Array
 
@@ -103,25 +104,48 @@ class Regression:
     def solved(self, chosen: Iterable[int], held: Mapping[int, Array] | None = None) -> Solution:
         """The least squares with some groups beside the base; held: groups at these values."""
         asked, held = sorted(chosen), held or {}
-        free = np.concatenate(
-            [np.arange(self.base.stop), *(_range(self.spans[g]) for g in asked if g not in held)]
-        ).astype(int)
-        values = np.zeros(self.training.columns.shape[1])
+        every, training, other = self._beside_base
+        values = np.zeros(len(training) - 1)
         for g, own in held.items():
-            values[self.spans[g]] = own
-        gram = self.training.gram
-        whole = gram[1:, 1:][np.ix_(free, free)]
-        pull = gram[1:, 0][free] - gram[1:, 1:][free] @ values
-        penalty = self._penalty[free]
-        inner = whole + np.diag(penalty)
+            values[self._of_group(g)] = own
+        free = np.concatenate([np.arange(0), *(self._of_group(g) for g in asked if g not in held)])
+        effective = float(sum(map(len, held.values())))
+        if len(free):
+            gram = training[1:, 1:][np.ix_(free, free)]
+            pull = training[1:, 0][free] - training[1:, 1:][free] @ values
+            inner = gram + np.diag(self._penalty[self.base.stop + free])
+            size = np.sqrt(np.diag(inner))
+            scaled = inner / size / size[:, None] + ROUNDING * np.eye(len(free))
+            both = np.linalg.solve(scaled, np.column_stack([pull, gram]) / size[:, None])
+            values[free] = both[:, 0] / size
+            effective += float(np.trace(both[:, 1:] / size[:, None]))
+        left = (_squares(each, values) for each in (training, other))
+        return Solution(every @ np.concatenate([[1.0], values]), *left, effective)
+
+    def _of_group(self, g: int) -> NDArray[np.int_]:
+        """The columns of a group, counted from the first of all groups."""
+        return _range(self.spans[g]) - self.base.stop
+
+    @cached_property
+    def _beside_base(self) -> tuple[Array, Array, Array]:
+        """The base solved beside whatever values (q,) the groups have.
+
+        The matrix (p, q + 1) that makes all values of 1 and these, and the inner products (q + 1,
+        q + 1) of what is then left of the training logs and of the others.
+        """
+        gram, stop = self.training.gram, self.base.stop
+        inner = gram[1:, 1:][:stop, :stop] + np.diag(self._penalty[:stop])
         size = np.sqrt(np.diag(inner))
-        inverse = np.linalg.pinv(inner / size / size[:, None], rcond=1e-13, hermitian=True)
-        inverse = inverse / size / size[:, None]
-        values[free] = inverse @ pull
-        own = np.arange(len(free)) >= self.base.stop
-        effective = float(np.einsum("ij,ji->i", inverse, whole)[own].sum()) + len(held)
-        left = (_squares(rows.gram, values) for rows in (self.training, self.other))
-        return Solution(values, *left, effective)
+        scaled = inner / size / size[:, None] + ROUNDING * np.eye(stop)
+        right = np.column_stack([gram[1 : stop + 1, 0], -gram[1 : stop + 1, stop + 1 :]])
+        base = np.linalg.solve(scaled, right / size[:, None]) / size[:, None]
+        groups = np.eye(base.shape[1])[1:]
+        every = np.vstack([base, groups])
+        # Of what is left: the force less the columns; a column beside the base has the other sign.
+        change = np.vstack([np.eye(base.shape[1])[:1], -every])
+        both = (change.T @ rows.gram @ change for rows in (self.training, self.other))
+        signs = np.concatenate([[1.0], -np.ones(base.shape[1] - 1)])
+        return every, *(each * signs * signs[:, None] for each in both)
 
     @cached_property
     def _penalty(self) -> Array:
@@ -184,6 +208,15 @@ class Regression:
         both = (self.training, self.other)
         one, other = (rows.force - rows.columns @ found.values for rows in both)
         return one, other
+
+    def is_noise(self, found: Solution) -> bool:
+        """Whether a solution leaves of every joint about what nothing here can explain."""
+        each = zip(self.left(found), (self.training, self.other), strict=True)
+        return all(
+            rms(left[rows.joint == joint]) < RULE.at_floor
+            for left, rows in each
+            for joint in np.unique(rows.joint)
+        )
 
     def score(self, before: Solution, after: Solution, among: int = 1) -> Score:
         """What one solution takes of what another leaves, over all joints (``acceptance``)."""
@@ -250,10 +283,9 @@ def _rows_of(
 def _with_torques(plain: Regression) -> Regression:
     """With the torque that all other groups predict as the column of each gain."""
     others = [g for g, group in enumerate(plain.groups) if group.what is not What.GAIN]
-    found = plain.solved(others)
     joints = {axis: k for k, axis in enumerate(dict.fromkeys(g.axis for g in plain.groups))}
 
-    def told(rows: Rows) -> Rows:
+    def told(rows: Rows, found: Solution) -> Rows:
         predicted = rows.torque + (rows.force - rows.columns @ found.values)
         columns = rows.columns.copy()
         for group, span in zip(plain.groups, plain.spans, strict=True):
@@ -262,7 +294,12 @@ def _with_torques(plain: Regression) -> Regression:
                 columns[:, span] = np.where(own, predicted, 0.0)[:, None]
         return replace(rows, columns=columns)
 
-    return replace(plain, training=told(plain.training), other=told(plain.other))
+    # At first the other groups alone tell it, in part as the gain has it; then all of them do.
+    for asked in (others, range(len(plain.groups))):
+        found = plain.solved(asked)
+        training, other = (told(rows, found) for rows in (plain.training, plain.other))
+        plain = replace(plain, training=training, other=other)
+    return plain
 
 
 def _by_what_is_left(plain: Regression) -> Regression:
