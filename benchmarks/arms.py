@@ -1,4 +1,4 @@
-"""Simulated arms that are not as their files say: `python -m benchmarks arms --machines N --seed S`.
+"""Simulated arms that are not as their files say: `python -m benchmarks arms --seed S`.
 
 As a user goes: `twin new --mjcf` of one log and the file, then the diagnosis with logs of two other
 runs. Every file states the rotors, the damping and the dry friction of its joints. Of each machine

@@ -150,7 +150,7 @@ def correct_body(
     before = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    found = departures_of(before.model, before.fits, before.datasets, progress)
+    found = departures_of(before.model, before.fits, before.datasets, load_catalogue(), progress)
     if not found.bodies:
         raise InputError(
             f"{model.mjcf_name}: the logs prove no body to correct it; `twin diagnose` says what "

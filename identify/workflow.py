@@ -243,7 +243,7 @@ def diagnose(
     known = usable(catalogue, model)
     parts = as_given(physics_alone(model), logs, holdout, test)
     result = fit_as_given(*parts, Catalogue([]), test_function, progress, [*known.values()])
-    away = departures_of(result.model, result.fits, result.datasets, progress)
+    away = departures_of(result.model, result.fits, result.datasets, known, progress)
     axes = {}
     for axis, fitted in away.fits.items():
         every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)

@@ -67,7 +67,9 @@ class Arm:
         for i, (joint, link) in enumerate(zip(self.joints, self.links, strict=True)):
             kind = "slide" if self.slides[i] else "hinge"
             own = self.mass[i] * self.radius[i] ** 2
-            centre = f"{0.45 * self.size[i]:.4g} {0.04 * self.size[i]:.3g} {0.03 * self.size[i]:.3g}"
+            centre = (
+                f"{0.45 * self.size[i]:.4g} {0.04 * self.size[i]:.3g} {0.03 * self.size[i]:.3g}"
+            )
             bodies += (
                 f'<body name="{link}" pos="{place}"><joint name="{joint}" type="{kind}" '
                 f'axis="{self.axes[i]}" armature="{self.armature[i]:.4g}" '
@@ -181,7 +183,8 @@ def log_of(arm: Arm, changed: Changed, seed: int) -> Log:
     own = inertia(arm) + arm.armature
     pull, hold = own * BANDWIDTH**2, 2.0 * own * BANDWIDTH
     every = round(1.0 / (STEP * arm.rate))
-    wanted, speed = _sines(rng, arm.reach, STEP * np.arange(round(DURATION / STEP)))
+    time = np.asarray(STEP * np.arange(round(DURATION / STEP)))
+    wanted, speed = _sines(rng, arm.reach, time)
     position, torque = np.empty((2, len(wanted) // every, n))
     bent, command, load = np.zeros(n), np.zeros(n), np.zeros(n)
     data.qpos[:], data.qvel[:] = wanted[0], speed[0]
@@ -189,7 +192,9 @@ def log_of(arm: Arm, changed: Changed, seed: int) -> Log:
         if k % LOOP == 0:
             plan.qpos[:], plan.qvel[:] = wanted[k], speed[k]
             mujoco.mj_forward(nominal, plan)
-            command = plan.qfrc_bias + pull * (wanted[k] - data.qpos) + hold * (speed[k] - data.qvel)
+            command = (
+                plan.qfrc_bias + pull * (wanted[k] - data.qpos) + hold * (speed[k] - data.qvel)
+            )
         if k % every == 0:
             weight = 0.0
             if changed.weightless:
@@ -215,9 +220,12 @@ def log_of(arm: Arm, changed: Changed, seed: int) -> Log:
     steps = np.round(position / arm.encoder) * arm.encoder
     size = torque.std(axis=0)
     torque += arm.noise * size * rng.standard_normal(torque.shape)
-    units = [AxisLog({"position": steps[:, i], "force": torque[:, i]}, ROTARY_UNITS)
-             if not slide else AxisLog({"position": steps[:, i], "force": torque[:, i]})
-             for i, slide in enumerate(arm.slides)]
+    units = [
+        AxisLog({"position": steps[:, i], "force": torque[:, i]}, ROTARY_UNITS)
+        if not slide
+        else AxisLog({"position": steps[:, i], "force": torque[:, i]})
+        for i, slide in enumerate(arm.slides)
+    ]
     return Log(float(arm.rate), dict(zip(arm.joints, units, strict=True)))
 
 

@@ -287,8 +287,10 @@ def with_stated(model: MachineModel, catalogue: Catalogue) -> MachineModel:
     from twin.mujoco.stated import stated_in  # MuJoCo takes long to load
 
     for axis, attributes in stated_in(model).items():
-        for effect in (e for e in catalogue.values() if e.of_joint):
-            values = {n: v for n, v in effect.of_joint(attributes).items()}
+        for effect in catalogue.values():
+            if effect.of_joint is None:
+                continue
+            values = effect.of_joint(attributes)
             if effect.is_present({**effect.starts(), **values}):
                 own = _as_stated(model.axes[axis], effect, values)
                 model = model.with_axis(axis, own)

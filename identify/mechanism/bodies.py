@@ -150,7 +150,7 @@ class Body:
             apart = Joints(tuple(r[::every] for r in bodies.readings), every * period)
             count = len(apart.readings[0]) - 1
             told = self.mechanism.per_unit(self.index, *apart.along(slice(0, count)))
-            times = every * (np.arange(count) + 0.5) - 0.5
+            times = np.asarray(every * (np.arange(count) + 0.5) - 0.5)
             self._known[key] = times, told[:, :, self.mechanism.moved_by(self.index)]
         return self._known[key]
 
@@ -257,7 +257,9 @@ def _inertial(lower: Array) -> Array:
     matrix = root @ root.T
     second = matrix[:3, :3]
     about = np.trace(second) * np.eye(3) - second
-    return np.array([matrix[3, 3], *matrix[3, :3], *about.diagonal(), *about[np.triu_indices(3, 1)]])
+    return np.array(
+        [matrix[3, 3], *matrix[3, :3], *about.diagonal(), *about[np.triu_indices(3, 1)]]
+    )
 
 
 def corrected(

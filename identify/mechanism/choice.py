@@ -3,8 +3,8 @@
 Sets of groups are grown from the best of each size, by Schwarz's criterion; bodies have what a body
 can have. Of the best set each group has to be accepted beside all others of it. What stands in the
 place of one in the best set without it, where that explains as much, is told with it: a body that
-is felt at one joint alone is a rotor there, and a torque constant what all weights of its joint have
-in common.
+is felt at one joint alone is a rotor there, and a torque constant what all weights of its joint
+have in common.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from functools import cached_property
 
 import numpy as np
 
+from identify.estimation.residual_noise import SHIFTS
 from identify.mechanism.groups import Group
 from identify.mechanism.regression import Regression, Rows, Solution
 from identify.rules import RULE
 from identify.selection.acceptance import Score
-from identify.estimation.residual_noise import SHIFTS
 from twin.signals import Array
 
 Chosen = frozenset[int]  # numbers of groups
@@ -167,5 +167,3 @@ def _shifted(rows: Rows, span: slice, rng: np.random.Generator) -> Rows:
         own = np.flatnonzero(rows.joint == joint)
         columns[own, span] = np.roll(columns[own, span], round(by * len(own)), axis=0)
     return replace(rows, columns=columns)
-
-

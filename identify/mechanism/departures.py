@@ -17,7 +17,7 @@ from identify.estimation.fit import Errors, Fit, fit_axis
 from identify.estimation.intervals import half_widths_by
 from identify.mechanism.bodies import Body, WrongBody
 from identify.mechanism.choice import Choice, Moved
-from identify.mechanism.groups import EFFECTS, Group, What, groups_of
+from identify.mechanism.groups import Group, What, groups_of
 from identify.mechanism.regression import Regression, regression_of
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
@@ -31,7 +31,8 @@ from twin.signals import Array
 class Departures:
     """What must move, and the joints beside the bodies as they were found.
 
-    asked: whether the joints are those of a mechanism, and more than noise is left of them.
+    asked: whether the joints are those of a mechanism, and more than noise is left of them. names:
+    of the laws by which groups are told.
     """
 
     datasets: Mapping[str, Dataset]
@@ -39,37 +40,44 @@ class Departures:
     moved: Sequence[Moved] = ()
     bodies: tuple[WrongBody, ...] = ()
     asked: bool = False
+    names: Mapping[What, str] = field(default_factory=dict)
 
     def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
         """The effects that a diagnosis of that axis may name."""
         if not self.asked:
             return catalogue
         own = {m.group.what for m in self.moved if m.group.axis == axis}
-        barred = {name for what, names in EFFECTS.items() if what not in own for name in names}
-        return Catalogue([e for e in catalogue.values() if e.name not in barred])
+        others = [what for what in What if what not in own]
+        return Catalogue([e for e in catalogue.values() if not any(w.covers(e) for w in others)])
 
     def with_ties(self, found: AxisDiagnosis) -> AxisDiagnosis:
         """The diagnosis of an axis, with what of other joints explains as much as a finding."""
-        also = {
-            name: tuple(group.told for group in m.tied)
-            for m in self.moved
-            if m.group.axis == found.dataset.axis
-            for name in EFFECTS.get(m.group.what, ())
-        }
+        own = [m for m in self.moved if m.group.axis == found.dataset.axis]
+        laws = {f.effect.name: f.effect for f in found.final.axis.effects}
+
+        def tied(name: str) -> list[str]:
+            alike = (m.tied for m in own if name in laws and m.group.what.covers(laws[name]))
+            return [self.told(group) for groups in alike for group in groups]
+
         findings = tuple(
-            replace(f, tied=tuple(dict.fromkeys((*f.tied, *also.get(f.effect, ())))))
+            replace(f, tied=tuple(dict.fromkeys((*f.tied, *tied(f.effect)))))
             for f in found.findings
         )
         return replace(found, findings=findings)
+
+    def told(self, group: Group) -> str:
+        """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
+        return f"{self.names[group.what]} of {group.place}"
 
 
 def departures_of(
     model: MachineModel,
     fits: Mapping[str, Fit],
     datasets: Mapping[str, Dataset],
+    catalogue: Catalogue,
     progress: Progress = silent,
 ) -> Departures:
-    """What must move away from the file of a mechanism.
+    """What must move away from the file of a mechanism; catalogue: of whose laws it is told.
 
     fits, datasets: of the axes that move. Of long logs the beginnings tell it. Nothing is asked
     where only noise is left of every joint.
@@ -91,7 +99,8 @@ def departures_of(
     for body in bodies:
         body.forget()
     moved = Choice(regression).moved()
-    return _with_bodies(replace(nothing, moved=moved, asked=True), regression)
+    names = {what: what.named(catalogue) for what in What}
+    return _with_bodies(replace(nothing, moved=moved, asked=True, names=names), regression)
 
 
 def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:
@@ -117,21 +126,23 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
     datasets = dict(found.datasets)
     for m in own:
         assert m.group.body is not None
-        change = told.changes[m.group.name]
+        change = told.changes[m.group.place]
         datasets = {a: m.group.body.corrected(d, change) for a, d in datasets.items()}
     fits = {a: _refitted(found.fits[a], d) for a, d in datasets.items()}
     errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
-    bodies = tuple(_told_of(m, told, errors) for m in own)
+    bodies = tuple(_told_of(found, m, told, errors) for m in own)
     return replace(found, datasets=datasets, fits=fits, bodies=bodies)
 
 
-def _told_of(moved: Moved, told: _Told, errors: Mapping[str, Errors]) -> WrongBody:
-    body, name = moved.group.body, moved.group.name
+def _told_of(
+    found: Departures, moved: Moved, told: _Told, errors: Mapping[str, Errors]
+) -> WrongBody:
+    body, name = moved.group.body, moved.group.place
     assert body is not None
     return WrongBody(
         body=name,
         axis=body.axis,
-        tied=tuple(group.name for group in moved.tied),
+        tied=tuple(g.place if g.body else found.told(g) for g in moved.tied),
         axes=tuple(axis for axis in body.axes if axis in errors),
         inertial=body.inertial,
         change=told.changes[name],
@@ -150,7 +161,7 @@ class _Told:
 
     @classmethod
     def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
-        """Beside all that moved, and the torque constants of all joints where the logs ask for them.
+        """Beside all that moved, and the torque constants of all joints where logs ask for them.
 
         The bands are by the scatter between stretches of time, of all joints together.
         """
@@ -167,13 +178,13 @@ class _Told:
         changes, bands = {}, {}
         for i in (i for i in asked if groups[i].what is What.BODY):
             span = regression.spans[i]
-            changes[groups[i].name] = found.values[span]
+            changes[groups[i].place] = found.values[span]
             at = np.flatnonzero(np.isin(where, _range(span)))
             weights = np.zeros((len(where), len(at)))
             weights[at, np.arange(len(at))] = 1.0
             band = half_widths_by(columns.copy(), left, weights)
             known = regression.known_by_data(asked, span)
-            bands[groups[i].name] = np.where(known, band, np.nan)
+            bands[groups[i].place] = np.where(known, band, np.nan)
         return cls(changes, bands)
 
 

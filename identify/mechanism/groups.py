@@ -19,28 +19,50 @@ import numpy as np
 
 from identify.dataset.prepared_log import PreparedLog, Reach
 from identify.mechanism.bodies import INERTIAL, LINK_MASS, Body
+from twin.effect import Effect, Kind
+from twin.effects import Catalogue
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
 
 class What(Enum):
-    """A kind of group; the values are the names of the effects by which one is told first."""
+    """A kind of group, in words."""
 
     BODY = LINK_MASS
-    ROTOR = "rotor_inertia"
-    GAIN = "torque_constant"
-    LOAD = "joint_load_friction"
-    CURVE = "spring"
+    ROTOR = "rotor"
+    GAIN = "motor constant"
+    LOAD = "friction by load"
+    CURVE = "torque by place"
+
+    def covers(self, effect: Effect) -> bool:
+        """Whether an effect of one joint is a law of such a group.
+
+        A motor that saturates below most of its torque, or has a deadband, is nearly another
+        constant.
+        """
+        if effect.is_nonparametric or effect.states:
+            return False
+        if self is What.ROTOR:
+            return effect.added_mass is not None
+        if self is What.GAIN:
+            return effect.kind is Kind.ACTUATION and not _reads_any(effect, "X", "V", "TIME")
+        if self is What.LOAD:
+            return effect.kind is Kind.MODIFIER and effect.reads("LOAD")
+        repeats = any(p.period for p in effect.parameters)
+        of_place = effect.reads("X") and not _reads_any(effect, "V", "TIME") and not repeats
+        return self is What.CURVE and effect.kind is Kind.FORCE and of_place
+
+    def named(self, catalogue: Catalogue) -> str:
+        """The law by which it is told first: that of joints, or that of the fewest parameters."""
+        own = [e for e in catalogue.values() if self.covers(e)]
+        first = sorted(own, key=lambda e: (not e.of_joints, len(e.parameters)))
+        return first[0].name if first else self.value
 
 
-# By kind the effects of one joint that a search may name where the group must move. A motor that
-# saturates below most of its torque, or has a deadband, is nearly another constant.
-EFFECTS = {
-    What.ROTOR: ("rotor_inertia",),
-    What.GAIN: ("torque_constant", "actuator_saturation", "actuator_deadband"),
-    What.LOAD: ("joint_load_friction",),
-    What.CURVE: ("spring", "gravity", "cable_slab"),
-}
+def _reads_any(effect: Effect, *slots: str) -> bool:
+    return any(map(effect.reads, slots))
+
+
 ORDER = 3  # of the curve of a joint's angle
 
 
@@ -49,8 +71,8 @@ class Group:
     """Parameters that move away from the model together, or not at all.
 
     axis: of the joint. body: where it is one. scale (k,): how far each may be off by itself, in its
-    own unit; infinite where nothing is known of that. least (k,): the least change that is possible.
-    reach: positions (rad or m) of the joint on the training logs.
+    own unit; infinite where nothing is known of that. least (k,): the least change of each that is
+    possible. reach: positions (rad or m) of the joint on the training logs.
     """
 
     what: What
@@ -61,14 +83,9 @@ class Group:
     reach: Reach = (-1.0, 1.0)
 
     @property
-    def name(self) -> str:
-        """E.g. "rotor_inertia of elbow"; of a body its name."""
-        return self.body.name if self.body else f"{self.what.value} of {self.axis}"
-
-    @property
-    def told(self) -> str:
-        """The same, of a body as well: "link_mass of fore"."""
-        return f"{self.what.value} of {self.body.name if self.body else self.axis}"
+    def place(self) -> str:
+        """The body or the joint."""
+        return self.body.name if self.body else self.axis
 
     @property
     def count(self) -> int:
@@ -109,7 +126,7 @@ def groups_of(
     out = []
     for body in bodies:
         axis, own = body.axis, axes[body.axis]
-        rotor = own["rotor_inertia"].values["inertia"] if "rotor_inertia" in own.names else 0.0
+        rotor = own.weighed.mass - own.mass
         out += [
             Group(What.BODY, axis, body.scale, np.full(len(INERTIAL), -np.inf), body),
             Group(What.ROTOR, axis, unknown, np.array([-rotor])),

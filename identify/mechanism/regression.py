@@ -119,8 +119,8 @@ class Regression:
             both = np.linalg.solve(scaled, np.column_stack([pull, gram]) / size[:, None])
             values[free] = both[:, 0] / size
             effective += float(np.trace(both[:, 1:] / size[:, None]))
-        left = (_squares(each, values) for each in (training, other))
-        return Solution(every @ np.concatenate([[1.0], values]), *left, effective)
+        whole = every @ np.concatenate([[1.0], values])
+        return Solution(whole, _squares(training, values), _squares(other, values), effective)
 
     def _of_group(self, g: int) -> NDArray[np.int_]:
         """The columns of a group, counted from the first of all groups."""
@@ -141,11 +141,12 @@ class Regression:
         base = np.linalg.solve(scaled, right / size[:, None]) / size[:, None]
         groups = np.eye(base.shape[1])[1:]
         every = np.vstack([base, groups])
-        # Of what is left: the force less the columns; a column beside the base has the other sign.
-        change = np.vstack([np.eye(base.shape[1])[:1], -every])
-        both = (change.T @ rows.gram @ change for rows in (self.training, self.other))
-        signs = np.concatenate([[1.0], -np.ones(base.shape[1] - 1)])
-        return every, *(each * signs * signs[:, None] for each in both)
+        change = np.vstack([np.eye(base.shape[1])[:1], every])
+        change[1:, 0] *= -1.0  # of the force what the base leaves, of columns what is beside it
+        training, other = (
+            np.asarray(change.T @ rows.gram @ change) for rows in (self.training, self.other)
+        )
+        return every, training, other
 
     @cached_property
     def _penalty(self) -> Array:

@@ -197,8 +197,8 @@ class Diagnosis(Pictured):
     refits: what fitting changed of the given model, by axis. not_tried: by axis, effects of the
     catalogue that it lacks and that could not be tried on it, and why. not_planned: for an
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
-    with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not that of
-    its file, the one that explains most first; the diagnoses are those with them as they were found.
+    with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not
+    that of its file, the one that explains most first; the diagnoses are with them as found.
     """
 
     fitted: MachineModel

@@ -392,7 +392,7 @@ def test_a_constant_force_is_no_torque_constant(folder):
     """Of 4 % of the weight, which masses could be: the motor had been named with 98 %."""
     logs = [arm_log(s, lambda q, v: np.add(friction(q, v), [0.0, 0.0, 0.1])) for s in (101, 102)]
     found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
-    told = departures_of(found.model, found.fits, found.datasets)
+    told = departures_of(found.model, found.fits, found.datasets, FEW)
     assert not told.moved
 
 
@@ -464,7 +464,7 @@ def test_the_bands_of_a_body_hold_the_truth(folder, monkeypatch):
     for seed in range(1000, 1012, 2):
         a, b = (arm_log(k, change=loaded) for k in (seed, seed + 1))
         found = fit(folder / "arm.toml", {"a": a}, {"b": b})
-        (body,) = departures_of(found.model, found.fits, found.datasets).bodies
+        (body,) = departures_of(found.model, found.fits, found.datasets, FEW).bodies
         off.append(np.abs(body.change - truth) / body.band)
     assert 0.85 <= np.mean(np.array(off) < 1.0) < 1.0
 
@@ -484,7 +484,7 @@ def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(
     for log in logs:
         log.axes["shoulder"].columns["force"] *= gain
     found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
-    told = departures_of(found.model, found.fits, found.datasets)
+    told = departures_of(found.model, found.fits, found.datasets, FEW)
     assert [m.group.axis for m in told.moved if m.group.what is What.GAIN] == [motor] * bool(motor)
     assert [b.body for b in told.bodies] == [body] * bool(body)
     for own in told.bodies:  # a column along its own joint and what turns with it

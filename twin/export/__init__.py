@@ -66,8 +66,6 @@ class Held:
     kept: tuple[str, ...]
     approximated: tuple[Remark, ...]
     lost: tuple[Remark, ...]
-    written: tuple[Remark, ...] = ()
-    """Of a file that is written back, what of it is another now, and what stays beside the model."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,8 @@ class Exported:
 
     files: Mapping[str, str | bytes]
     axes: Mapping[str, Held]
+    written: tuple[Remark, ...] = ()
+    """Of a file that is written back, what of it is another now, and what stays of its own."""
 
     @property
     def kept(self) -> dict[str, tuple[str, ...]]:
@@ -91,11 +91,6 @@ class Exported:
     def lost(self) -> tuple[Remark, ...]:
         """What they do not hold."""
         return tuple(remark for own in self.axes.values() for remark in own.lost)
-
-    @property
-    def written(self) -> tuple[Remark, ...]:
-        """What is another in a file that is written back, and what stays beside the model."""
-        return tuple(remark for own in self.axes.values() for remark in own.written)
 
 
 Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]

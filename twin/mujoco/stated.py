@@ -27,12 +27,13 @@ OF_TENDONS["springref"] = "tendon_lengthspring"
 
 
 def stated(text: str, name: str, joints: Mapping[str, str]) -> dict[str, dict[str, float]]:
-    """By axis, the attributes of its joint or tendon, SI units; all of them, 0 where none is stated.
+    """By axis, the attributes of its joint or tendon, SI units; 0 where none is stated.
 
     text, name: of an MJCF or URDF file. joints: axis -> name of its joint or fixed tendon. Raises
     InputError where MuJoCo cannot read or build it.
     """
-    return {a: dict(own) for a, own in zip(joints, _stated(text, name, (*joints.values(),)))}
+    found = _stated(text, name, (*joints.values(),))
+    return {axis: dict(own) for axis, own in zip(joints, found, strict=True)}
 
 
 def stated_in(model: MachineModel) -> dict[str, dict[str, float]]:
@@ -41,13 +42,13 @@ def stated_in(model: MachineModel) -> dict[str, dict[str, float]]:
 
 
 @lru_cache(maxsize=4)  # of one model it is asked several times
-def _stated(text: str, name: str, joints: tuple[str, ...]) -> tuple[tuple[tuple[str, float], ...]]:
+def _stated(text: str, name: str, joints: tuple[str, ...]) -> list[dict[str, float]]:
     try:
         model = read_bodies(text, name).compile()
     except ValueError as error:
         said = " ".join(str(error).split())
         raise InputError(f"{name}: MuJoCo cannot build it: {said}") from error
-    return tuple(tuple(_attributes(model, joint).items()) for joint in joints)
+    return [_attributes(model, joint) for joint in joints]
 
 
 def _attributes(model: mujoco.MjModel, joint: str) -> dict[str, float]:

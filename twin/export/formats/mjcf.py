@@ -3,8 +3,8 @@
 Friction, damping, springs and rotor inertia are attributes of a joint or a tendon; each effect says
 which of them hold it (``Effect.joint_attributes``). The text of the file stays as it is, but for
 those of them that the model has at another value than the file, each of which is told, and for
-those of joints that are no axes, whose forces are among the axes'. A value that lies in the interval
-of the model's is none other; what no effect of the model holds stays, and is told as well. What they
+those of joints that are no axes, whose forces are among the axes'. A value within the interval of
+the model's is none other; what no effect of the model holds stays, and is told as well. What they
 lose of an effect is told along logs: the force that it makes in the model less that of
 
     -frictionloss sgn(v) - damping v - stiffness (q - springref)
@@ -52,21 +52,18 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     spec = read_spec(text, name)
     at_motor = {a: _at_motor(own, _gear(spec, own.joint or a)) for a, own in model.axes.items()}
     has = stated(model.mjcf, name, {a: own.joint or a for a, own in model.axes.items()})
-    told: dict[str, tuple[Remark, ...]] = {}
+    written = list[Remark]()
     for axis, own in model.axes.items():
         known = model.intervals.get(axis)
         near = _as_stated(own, has[axis], known.ends if known else {})
         wanted = _wanted(near, bool(at_motor[axis]))
         text = _with_attributes(text, name, spec, axis, own, wanted, at_motor[axis])
-        told[axis] = tuple(_remarks(axis, own, has[axis], wanted))
+        written += _remarks(axis, own, has[axis], wanted)
     if model.joints:
         for moved in (j for j in spec.joints if j.name not in model.joints.values()):
             text = with_joint(text, moved.name, _changed(moved, dict.fromkeys(PASSIVE, 0.0)))
-    held = {
-        axis: replace(_judged(model, axis, logs, bool(at_motor[axis])), written=told[axis])
-        for axis in model.axes
-    }
-    return Exported({f"{Path(name).stem}.xml": text}, held)
+    held = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
+    return Exported({f"{Path(name).stem}.xml": text}, held, tuple(written))
 
 
 def attributes_of(axis: AxisModel) -> dict[str, float]:
