@@ -182,7 +182,7 @@ class Body:
         return dataset.with_logs(map(of, dataset.logs)) if dataset.axis in self.axes else dataset
 
 
-def possible(found: Array, information: Array, bodies: Sequence[Array], most: int = 60) -> Array:
+def possible(found: Array, information: Array, bodies: Sequence[Array], most: int = 200) -> Array:
     """The parameters (10 k,) nearest to those found that k bodies can have.
 
     found (10 k,): of a fit without constraint. information (10 k, 10 k): of that fit, by which near
@@ -197,7 +197,7 @@ def possible(found: Array, information: Array, bodies: Sequence[Array], most: in
     power, axes = np.linalg.eigh(information)
     root = (axes * np.sqrt(np.maximum(power, 0.0))).T
     begun = np.concatenate([_triangle(own) for own in bodies])
-    size = np.maximum(np.abs(begun), 1e-3 * np.abs(begun).max())  # of zeros of the triangle
+    size = np.concatenate([np.sqrt(np.diag(_pseudo(own)))[LOWER[0]] for own in bodies])
     squares = _squares()
 
     def left(x: Array) -> Array:
@@ -209,7 +209,7 @@ def possible(found: Array, information: Array, bodies: Sequence[Array], most: in
         each = [2.0 * squares @ own for own in np.split(x * size, len(bodies))]
         return root @ block_diag(*each) * size
 
-    done = least_squares(left, begun / size, slopes, max_nfev=most)
+    done = least_squares(left, begun / size, slopes, method="lm", max_nfev=most)
     return np.concatenate([_inertial(own) for own in np.split(done.x * size, len(bodies))])
 
 

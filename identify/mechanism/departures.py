@@ -18,7 +18,8 @@ from identify.estimation.intervals import half_widths_by
 from identify.mechanism.bodies import Body, WrongBody
 from identify.mechanism.choice import Choice, Moved
 from identify.mechanism.groups import Group, What, groups_of
-from identify.mechanism.regression import Regression, regression_of
+from identify.mechanism.regression import Regression, Solution, regression_of
+from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.effects import Catalogue
@@ -161,39 +162,39 @@ class _Told:
 
     @classmethod
     def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
-        """Beside all that moved, and the torque constants of all joints where logs ask for them.
+        """Beside all that moved. The bands are by the scatter between stretches of time.
 
-        The bands are by the scatter between stretches of time, of all joints together.
+        Of all joints together. Where the logs ask for other torque constants, which no file knows
+        well, what the values are beside these is within the bands.
         """
-        regression, groups = _with_gains(regression), regression.groups
-        alone = [i for i, g in enumerate(groups) if g in moved]
-        gains = [i for i, g in enumerate(groups) if g.what is What.GAIN and g not in moved]
-        tried = [(own, regression.feasible(own)) for own in (alone, [*alone, *gains])]
-        asked, found = min(tried, key=lambda pair: regression.criterion(pair[1]))
+        groups = regression.groups
+        asked = [i for i, g in enumerate(groups) if g in moved]
+        found, beside = regression.feasible(asked), _beside_gains(regression, asked)
         left, _ = regression.left(found)
         where = np.concatenate(
             [np.arange(regression.base.stop), *(_range(regression.spans[i]) for i in asked)]
         )
-        columns = regression.training.columns[:, where]
-        changes, bands = {}, {}
+        columns, weights = regression.training.columns[:, where], np.eye(len(where))
+        bands = half_widths_by(columns.copy(), left, weights)
+        changes, told = {}, {}
         for i in (i for i in asked if groups[i].what is What.BODY):
             span = regression.spans[i]
-            changes[groups[i].place] = found.values[span]
-            at = np.flatnonzero(np.isin(where, _range(span)))
-            weights = np.zeros((len(where), len(at)))
-            weights[at, np.arange(len(at))] = 1.0
-            band = half_widths_by(columns.copy(), left, weights)
+            own, other = found.values[span], (beside or found).values[span]
+            band = np.hypot(bands[np.isin(where, _range(span))], other - own)
             known = regression.known_by_data(asked, span)
-            bands[groups[i].place] = np.where(known, band, np.nan)
-        return cls(changes, bands)
+            changes[groups[i].place], told[groups[i].place] = own, np.where(known, band, np.nan)
+        return cls(changes, told)
 
 
-def _with_gains(regression: Regression) -> Regression:
-    """The regression whose torque constants are known as well as files and papers know them."""
+def _beside_gains(regression: Regression, asked: Sequence[int]) -> Solution | None:
+    """The same beside the torque constants of all joints; None where the logs ask for none."""
     accuracy = 0.1  # relative: two papers of one machine, by its makers, differ by as much
     known = np.full(1, accuracy)
     groups = [replace(g, scale=known) if g.what is What.GAIN else g for g in regression.groups]
-    return replace(regression, groups=groups)
+    free = replace(regression, groups=groups)
+    gains = [i for i, g in enumerate(groups) if g.what is What.GAIN and i not in asked]
+    alone, both = (free.feasible(own) for own in (asked, [*asked, *gains]))
+    return both if free.criterion(both) < free.criterion(alone) - RULE.least_bic else None
 
 
 def _range(span: slice) -> Array:
