@@ -170,8 +170,8 @@ def _load(model: mujoco.MjModel, body: int, mass: float, place: Array) -> None:
     model.body_simple[body] = 0
 
 
-def log_of(arm: Arm, changed: Changed, seed: int) -> Log:
-    """One recording of the machine."""
+def log_of(arm: Arm, changed: Changed, seed: int, duration: float = DURATION) -> Log:
+    """One recording of the machine, of so many s."""
     model, rng = machine_of(arm, changed), np.random.default_rng(seed)
     nominal, n = mujoco.MjModel.from_xml_string(arm.text), len(arm.mass)
     data, plan, still = mujoco.MjData(model), mujoco.MjData(nominal), mujoco.MjData(model)
@@ -183,7 +183,7 @@ def log_of(arm: Arm, changed: Changed, seed: int) -> Log:
     own = inertia(arm) + arm.armature
     pull, hold = own * BANDWIDTH**2, 2.0 * own * BANDWIDTH
     every = round(1.0 / (STEP * arm.rate))
-    time = np.asarray(STEP * np.arange(round(DURATION / STEP)))
+    time = np.asarray(STEP * np.arange(round(duration / STEP)))
     wanted, speed = _sines(rng, arm.reach, time)
     position, torque = np.empty((2, len(wanted) // every, n))
     bent, command, load = np.zeros(n), np.zeros(n), np.zeros(n)
