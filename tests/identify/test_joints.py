@@ -29,7 +29,7 @@ from cli_runs import refusal, twin
 from strict_json import valid
 
 from identify.analysis.first_model import first_model
-from identify.analysis.joint_signs import misassigned
+from identify.analysis.recording import misassigned
 from identify.dataset.preparation import datasets
 from identify.estimation.open_loop import open_loop
 from identify.mechanism.departures import departures_of
@@ -177,7 +177,7 @@ def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
     signals = ([log.axes[j].columns[n] for j in JOINTS] for n in ("position", "force"))
     changed = arm_of(*change(*(np.transpose(columns) for columns in signals)))
     told = misassigned(load_model(folder / "arm.toml"), changed)
-    assert told is None if said is None else told is not None and said in told
+    assert told is None if said is None else told is not None and said in told.said
 
 
 def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder):
