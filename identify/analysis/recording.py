@@ -38,8 +38,8 @@ class Recording:
     """How a recording is another than the machine's file needs, and how it is read right.
 
     said: in words, with what to change in the import map. axis: of which it makes most. before,
-    after: parts of its torque, 0..1, that bodies and friction leave as it is and as it is read. read:
-    makes of a log one as it is read right.
+    after: parts of its torque, 0..1, that bodies and friction leave as it is and as it is read.
+    read: makes of a log one as it is read right.
     """
 
     said: str
@@ -160,18 +160,18 @@ def _balances(model: MachineModel, log: Log, going: Sequence[str]) -> dict[str, 
 
 
 def _of_torques(
-    model: MachineModel, plain: Mapping[str, _Balance], going: Sequence[str], suspects: Sequence[str]
-) -> Iterator[tuple[Array, Reader, str]]:  # fmt: skip
+    model: MachineModel, plain: Mapping[str, _Balance], going: Sequence[str], asked: Sequence[str]
+) -> Iterator[tuple[Array, Reader, str]]:
     """What is left of each joint where torques are others, with how it is read and told."""
     as_it_is = np.array([plain[a].left() for a in going])
     without = np.array([plain[axis].left(weight=0.0) for axis in going])
     said = (
-        "the recorded torques have the weight of the links taken out, as drivers do that compensate "
-        "it: import the whole torque of the motors (their current times its constant)"
+        "the recorded torques have the weight of the links taken out, as drivers do that "
+        "compensate it: import the whole torque of the motors (their current times its constant)"
     )
     yield without, WithWeight(model), said
     every, ways, all_said = as_it_is.copy(), list[Reader](), list[str]()
-    for axis in suspects:
+    for axis in asked:
         factor, said = _factor(axis, plain[axis].ratio())
         if factor != 1.0:
             left, at = as_it_is.copy(), going.index(axis)

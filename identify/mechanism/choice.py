@@ -1,10 +1,10 @@
 """Which groups of a mechanism must move away from its file: one search, one acceptance test.
 
-Sets of groups are grown from the best of each size, by Schwarz's criterion; bodies have what a body
-can have. Of the best set each group has to be accepted beside all others of it. What stands in the
-place of one in the best set without it, where that explains as much, is told with it: a body that
-is felt at one joint alone is a rotor there, and a torque constant what all weights of its joint
-have in common.
+Sets of groups are grown from the best of each size, by Schwarz's criterion, beside what the file
+does not state though it is there; bodies have what a body can have. Of the best set each group has
+to be accepted beside all others of it. What stands in the place of one in the best set without it,
+where that explains as much, is told with it: a body that is felt at one joint alone is a rotor
+there, and a torque constant what all weights of its joint have in common.
 """
 
 from __future__ import annotations
@@ -76,10 +76,11 @@ class Choice:
 
     def _grown(self, barred: Chosen = frozenset()) -> Chosen:
         """The best set of all that were grown; barred: groups that are in none."""
-        every = frozenset(range(len(self.regression.groups))) - barred
-        layer: list[Chosen] = [frozenset()]
+        groups = self.regression.groups
+        every = frozenset(range(len(groups))) - barred
+        layer: list[Chosen] = [frozenset(g for g in every if groups[g].unstated)]
         best = layer[0]
-        for _ in range(MOST):
+        for _ in range(0 if self._is_noise(best) else MOST):
             larger = {own | {g} for own in layer for g in every - own}
             first = sorted(larger, key=self._roughly)[: 2 * WIDE]
             layer = sorted(first, key=self.criterion)[:WIDE]

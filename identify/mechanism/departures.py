@@ -44,10 +44,15 @@ class Departures:
     names: Mapping[What, str] = field(default_factory=dict)
 
     def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
-        """The effects that a diagnosis of that axis may name."""
+        """The effects that a diagnosis of that axis may name.
+
+        Friction that follows the load is a matter of one joint, and so is a rotor of which the file
+        says nothing: what the model lacks otherwise on a joint may hide them here.
+        """
         if not self.asked:
             return catalogue
-        own = {m.group.what for m in self.moved if m.group.axis == axis}
+        own = {m.group.what for m in self.moved if m.group.axis == axis} | {What.LOAD}
+        own |= {What.ROTOR} if self.fits[axis].begun.weighed is self.fits[axis].begun else set()
         others = [what for what in What if what not in own]
         return Catalogue([e for e in catalogue.values() if not any(w.covers(e) for w in others)])
 

@@ -72,7 +72,8 @@ class Group:
 
     axis: of the joint. body: where it is one. scale (k,): how far each may be off by itself, in its
     own unit; infinite where nothing is known of that. least (k,): the least change of each that is
-    possible. reach: positions (rad or m) of the joint on the training logs.
+    possible. unstated: whether the file says nothing of what is there for sure, as of a motor's
+    rotor. reach: positions (rad or m) of the joint on the training logs.
     """
 
     what: What
@@ -81,6 +82,7 @@ class Group:
     least: Array
     body: Body | None = None
     reach: Reach = (-1.0, 1.0)
+    unstated: bool = False
 
     @property
     def place(self) -> str:
@@ -129,7 +131,7 @@ def groups_of(
         rotor = own.weighed.mass - own.mass
         out += [
             Group(What.BODY, axis, body.scale, np.full(len(INERTIAL), -np.inf), body),
-            Group(What.ROTOR, axis, unknown, np.array([-rotor])),
+            Group(What.ROTOR, axis, unknown, np.array([-rotor]), unstated=rotor == 0.0),
             Group(What.GAIN, axis, unknown, free),
             Group(What.LOAD, axis, unknown, np.zeros(1)),
             Group(
