@@ -20,7 +20,7 @@ from twin.errors import InputError
 # Each is loaded when it runs: some need packages that the others do without.
 MEASURED = (
     "simulation", "starts", "peer_fits", "diagnosis", "passes", "kinds", "stages",
-    "mcap_logs", "effect_cost", "emps", "joints", "withheld", "tx40", "foreign", "drives",
+    "mcap_logs", "effect_cost", "emps", "joints", "arms", "withheld", "tx40", "foreign", "drives",
     "presliding", "thesis", "selftest", "export", "frf", "rule", "fuzz", "door", "sound",
     "mutation", "size", "held",
 )  # fmt: skip

@@ -31,7 +31,7 @@ from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
-from identify.links import is_better, suspects_of
+from identify.mechanism.departures import departures_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.results.frequency import FrequencyResponse
@@ -243,19 +243,12 @@ def diagnose(
     known = usable(catalogue, model)
     parts = as_given(physics_alone(model), logs, holdout, test)
     result = fit_as_given(*parts, Catalogue([]), test_function, progress, [*known.values()])
-    suspects = suspects_of(result.model, result.fits, result.datasets, progress)
-    told = {a: offered(result.given.axes[a], d, known) for a, d in result.datasets.items()}
-    every = {axis: suspects.offered(known, axis) for axis, known in told.items()}
-    body = suspects.body
-    if body is None or not body.explains_all:
-        axes = _diagnosed(result.fits, result.datasets, every, progress)
-    if body is not None:
-        with_it = within(progress, f"with another {body.body}")
-        beside = _diagnosed(body.fits, body.datasets, every, with_it)
-        if body.explains_all or is_better(beside, axes):
-            axes = beside
-        else:
-            body = None
+    away = departures_of(result.model, result.fits, result.datasets, known, progress)
+    axes = {}
+    for axis, fitted in away.fits.items():
+        every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
+        of_axis = within(progress, f"diagnosis of {axis}")
+        axes[axis] = away.with_ties(diagnose_axis(fitted, away.datasets[axis], every, of_axis))
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():
@@ -263,7 +256,7 @@ def diagnose(
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
-    prepared = result.datasets if body else {axis: d.dataset for axis, d in axes.items()}
+    prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
     found = Diagnosis(
         fitted=model,
         axes=axes,
@@ -274,24 +267,10 @@ def diagnose(
         not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
-        body=body,
+        bodies=away.bodies,
     )
     _ = found.model  # it is complete: to tell it computes nothing
     return found
-
-
-def _diagnosed(
-    fits: Mapping[str, Fit],
-    found: Mapping[str, Dataset],
-    offered: Mapping[str, Catalogue],
-    progress: Progress,
-) -> dict[str, AxisDiagnosis]:
-    return {
-        axis: diagnose_axis(
-            fit, found[axis], offered[axis], within(progress, f"diagnosis of {axis}")
-        )
-        for axis, fit in fits.items()
-    }
 
 
 def _begun(

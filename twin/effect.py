@@ -212,6 +212,9 @@ class Effect:
     joint_attributes: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Values by name -> attributes of a joint of MuJoCo that hold the effect, or come nearest to
     it: frictionloss, damping, stiffness, springref, armature, in SI units; None: none does."""
+    of_joint: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
+    """Attributes of a joint of MuJoCo, SI units -> values by name of the effect that they are; None
+    where it is another effect to which they are taken over, or none."""
     motor_attributes: Callable[[Mapping[str, float], float], Mapping[str, Sequence[float]]] = (
         lambda values, gear: {}
     )

@@ -105,7 +105,7 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined, unused
-    from identify.analysis.joint_signs import misassigned
+    from identify.analysis.recording import misassigned
     from identify.output.answers.machine import NewModelAnswer
     from twin.effects import load_catalogue
     from twin.files import kept_beside

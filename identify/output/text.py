@@ -271,10 +271,12 @@ def _errors_of(step: HistoryStep, words: Callable[[str], str]) -> Iterator[str]:
 @text_of.register
 def corrected_text(result: CorrectedBody) -> str:
     """What was written into the MuJoCo file, and the errors before and after."""
-    body, file, given = result.body, result.model.mjcf_name, result.given.mjcf_name
-    why = wrong_body_in_words(body, result.given)
-    first = f"Body {body.body} of {file} has {result.element}; {given} is as it was."
-    return "\n".join([first, *(f"  {line}" for line in why)])
+    file, given, lines = result.model.mjcf_name, result.given.mjcf_name, list[str]()
+    for body in result.bodies:
+        why = wrong_body_in_words(body, result.given)
+        lines.append(f"Body {body.body} of {file} has {body.written}; {given} is as it was.")
+        lines += [f"  {line}" for line in why]
+    return "\n".join(lines)
 
 
 @text_of.register

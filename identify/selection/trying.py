@@ -79,7 +79,8 @@ def tried_beside(
     known, barred = {*trial.taken, *judged.fit.begun.names, *trial.barred}, trial.barred
     effects = [e for e in absent_effects(judged.fit.axis, trial.catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not e.is_noise]
-    freed = [c for c in freed_of(judged.fit.axis) if c.name not in barred]
+    held = (c for c in freed_of(judged.fit.axis) if c.name not in barred)
+    freed = [c for c in held if not c.is_strength or c.name in trial.catalogue]
     changes: list[Change] = [*plain, *freed]
     if judged.at_floor:
         changes = []

@@ -9,7 +9,7 @@ from pydantic import Field
 from identify.dataset.dataset import Role
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.links import INERTIAL, WrongBody
+from identify.mechanism.bodies import INERTIAL, WrongBody
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
 from identify.output.answers.fits import (
     EstimateEntry,
@@ -436,7 +436,9 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 
     axes: dict[str, DiagnosisEntry]
     body: BodyEntry | None
-    """Of a mechanism, what is told of its bodies; the axes are told with it as it was found."""
+    """Of a mechanism, the body of which most is told; the axes are told with it as it was found."""
+    bodies: list[BodyEntry]
+    """All bodies of which something is told."""
     model: str
     """The model with everything that was found, as the text of its TOML file."""
     mujoco: str | None
@@ -449,11 +451,12 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 @answer_of.register
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
-    body = result.body and BodyEntry.of(result.body, **_of_body(result.body, result.fitted))
+    bodies = [BodyEntry.of(body, **_of_body(body, result.fitted)) for body in result.bodies]
+    body = next(iter(bodies), None)
     leading, model = axes[result.leading.dataset.axis], result.model
     mujoco = model.mjcf if body else None
     written = {"model": format_model(model), "mujoco": mujoco}
-    return DiagnosisAnswer.of(leading, axes=axes, body=body, **written, **more)
+    return DiagnosisAnswer.of(leading, axes=axes, body=body, bodies=bodies, **written, **more)
 
 
 def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identify.dataset.dataset import Role
-from identify.links import WrongBody
+from identify.mechanism.bodies import WrongBody
 from identify.output.machine import minor
 from identify.output.numbers import DisplayUnit, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import AnswerBlock, Block, Listing, Tile, Tone
