@@ -153,10 +153,11 @@ def _under(motion: Motion, force: Array) -> Motion:
 def settled(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[PreparedLog]:
     """The logs with what laws with memory hold at rest where the readings do not tell it.
 
-    There it is what balances the force, as far as the noise of the readings leaves room for it.
+    There it is what balances the force, as far as the noise of the readings leaves room for it. A
+    friction that sticks balances it by itself.
     """
     hides = [log.motion.path.room if log.motion.path else 0.0 for log in logs]
-    if not any(f.effect.remembers for f in axis.effects) or not any(hides):
+    if not any(f.effect.remembers for f in axis.effects) or sticks(axis) or not any(hides):
         return list(logs)
     own, force = Valued.of(axis), _held_over(axis, logs[int(np.argmax(hides))].motion, max(hides))
 
