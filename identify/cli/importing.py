@@ -133,6 +133,7 @@ def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: st
     """Write the map beside the log, and the log where the map is complete."""
     from identify.analysis.map_proof import proofs_of
     from identify.output.answers.machine import ImportAnswer
+    from identify.output.machine import in_shell
     from identify.output.proposal import map_answer, proof_text
     from twin.importers import import_log, load_mapping
 
@@ -140,7 +141,7 @@ def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: st
     kept = _kept(mapping, text)
     if lacks := found.lacks(answers):
         said = f"{mapping}: the map lacks what is marked NOT KNOWN or '?'; complete it, then"
-        said += f"\n  twin import {source} --map {mapping} -o {log}"
+        said += f"\n  {in_shell('import', source, '--map', mapping, '-o', log)}"
         parts = filter(None, (shown, said))
         return Said("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)
     done = _by_map([source], mapping, log)

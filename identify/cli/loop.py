@@ -35,7 +35,7 @@ from identify.cli.shared import (
     with_logs,
     written,
 )
-from identify.output.machine import briefly
+from identify.output.machine import briefly, in_shell
 from twin.errors import InputError
 
 if TYPE_CHECKING:
@@ -397,9 +397,11 @@ def plan(
     said = said_of(done.result, done.warnings, file=out, setpoints=table)
     save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
     write_setpoints(chosen.experiment, machine, 0, table)
+    own = (word for file in effects or () for word in ("--effects", file))
+    run = in_shell("simulate", out, "--model", model, *own, "-o", out.with_suffix(".mcap"))
     text = (
         f"{said.text}\n{table}: the setpoints, to be run on the machine"
-        f"\n{out}: the experiment; `twin simulate {out} --model MODEL -o LOG` simulates it"
+        f"\n{out}: the experiment; `{run}` simulates it"
     )
     return replace(said, text=text)
 

@@ -23,7 +23,7 @@ from identify.cli.shared import (
     was_kept,
     written,
 )
-from identify.output.machine import briefly
+from identify.output.machine import briefly, in_shell
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
 
@@ -99,6 +99,9 @@ def new(
             "where several move; it is held, and the rest is found beside it.",
         ),
     ] = None,
+    name: Annotated[
+        str | None, Option(help="Name of the machine; that of the file if left out.")
+    ] = None,
 ) -> Said:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
 
@@ -115,7 +118,7 @@ def new(
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read, known = dict(recorded), _masses(mass or ())
     with recorded.explaining():
-        model = first_model(read, out.stem, load_catalogue(), bodies, known)
+        model = first_model(read, name or out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
     doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
@@ -129,7 +132,7 @@ def new(
         "no break away from rest takes more than Coulomb friction; it is set to that"
         for label, axes in having.items()
     ]
-    text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
+    text = f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, logs[0])}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]

@@ -6,6 +6,7 @@ whose modules take a second to load.
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +27,12 @@ if TYPE_CHECKING:
     from twin.laws.verdict import LawReport
 
 ASSUMES = "the import map assumes"  # begins a finding on what nobody has confirmed
+
+
+def in_shell(*words: object) -> str:
+    """A command as it is typed in a shell, whatever is in the names of its files."""
+    return shlex.join(["twin", *map(str, words)])
+
 
 # --- exports ---------------------------------------------------------------------------------
 
@@ -153,7 +160,7 @@ def briefly(findings: Sequence[str]) -> list[str]:
     folded = minor(findings)
     counts = Counter(line.partition(": warning: ")[0] for line in folded)
     return [line for line in findings if line not in folded] + [
-        f"{log}: {n} warning{'s' if n > 1 else ''}; `twin check {log}` tells what to do"
+        f"{log}: {n} warning{'s' if n > 1 else ''}; `{in_shell('check', log)}` tells what to do"
         for log, n in counts.items()
     ]
 
@@ -198,4 +205,4 @@ def _checked(name: str, info: LogInfo) -> str:
         return "suitable for identification"
     worst = "warnings alone" if info.check.ok else "not suitable for identification"
     kinds = dict.fromkeys(f"{f.fault.value} (axis {f.axis})" for f in findings)
-    return f"{worst}: {', '.join(kinds)}; `twin check {name}` tells where, and what to do"
+    return f"{worst}: {', '.join(kinds)}; `{in_shell('check', name)}` tells where, and what to do"

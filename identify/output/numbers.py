@@ -71,6 +71,11 @@ class DisplayUnit:
         return [f"{text}e{power:03d}" if power else text for text in texts]
 
 
+def by_how_much(gain: float, unit: str) -> str:
+    """A difference, of which its sign is a word: "2 um larger"."""
+    return f"{quantity(abs(gain), unit)} {'larger' if gain >= 0.0 else 'smaller'}"
+
+
 def quantity(value: float | None, unit: str) -> str:
     """One SI value in the unit that suits it, e.g. "27.0 mm"."""
     return DisplayUnit.of(unit, [0.0 if value is None else value]).text(value)

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
-from identify.output.numbers import DisplayUnit, arrow, change, listed, number, quantity
+from identify.output.numbers import (
+    DisplayUnit,
+    arrow,
+    by_how_much,
+    change,
+    listed,
+    number,
+    quantity,
+)
 from identify.output.words.diagnosis import (
     all_found,
     named_in_words,
@@ -40,6 +48,7 @@ from identify.output.words.next_step import (
     in_order,
     model_in_words,
     names_of,
+    next_step_in_words,
     question_in_words,
     supposed_in_words,
     wrong_body_in_words,
@@ -137,7 +146,8 @@ def _position_error(c: AxisComparison, log: str) -> str:
     if log not in c.position_error:
         return ""
     error = quantity(c.position_error[log], c.units.position)
-    return f", {c.units.words('free-running position error')} {error}"
+    fit = f" (fit {100.0 * c.position_fit[log]:.4g} %, NRMSE)"
+    return f", {c.units.words('free-running position error')} {error}{fit}"
 
 
 @text_of.register
@@ -158,12 +168,12 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
             errors.append(_errors(d, tested.on, tested.before, tested.after))
         lines.append(f"axis {axis}: {said.verdict}{named}")
         lines += [f"  {units.words('force error')} {error}" for error in errors]
-        if axis in result.next_experiments:
-            lines += [f"  {line}" for line in plan_text(result.next_experiments[axis]).splitlines()]
         for first, *others in said.findings:
             lines += [f"  {first}", *(f"    {other}" for other in others)]
         rest = (said.beside, said.shapes, said.left, said.advice)
         lines += [f"  {sentence}" for sentences in rest for sentence in sentences]
+        if axis in result.next_experiments:
+            lines.append(f"  {next_step_in_words(result.next_experiments[axis])}")
         steps = source.still_to_do(said.commands, names_of(d.dataset))
         lines += [f"  next: {text}" for text in steps]
         lines += _candidates(d)
@@ -291,7 +301,7 @@ def feedforward_text(result: Feedforward) -> str:
             for name, e in found.by_feedforward.items()
         ]
         lines += [
-            f"    with all but {e}: RMS {quantity(gain, unit)} larger"
+            f"    with all but {e}: RMS {by_how_much(gain, unit)}"
             for e, gain in found.gains.items()
         ]
         lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]

@@ -76,6 +76,15 @@ class AxisComparison:
         return self.logs[0].motion.units
 
     @property
+    def position_fit(self) -> dict[str, float]:
+        """By log 1 - RMS error / RMS of the position about its mean: 1 of a model that is right.
+
+        As a percentage it is the NRMSE fit of MATLAB's compare, of the free run with its restarts.
+        """
+        spread = {log.motion.name: float(np.std(log.motion.position)) for log in self.logs}
+        return {name: 1.0 - error / spread[name] for name, error in self.position_error.items()}
+
+    @property
     def total_error(self) -> float:
         """RMS force error over all logs, N."""
         return rms(self.residual)

@@ -140,14 +140,17 @@ def _mark(model: mujoco.MjModel, data: mujoco.MjData, joint: str) -> tuple[int, 
     """The body that a joint moves, and the place in it above an end of its largest shape."""
     body = int(model.joint(joint).bodyid[0])
     own = [i for i in range(model.ngeom) if model.geom_bodyid[i] == body]
-    place, top = np.array(data.xpos[body]), -np.inf
+    place, top, centres = np.array(data.xpos[body]), -np.inf, []
     for i in sorted(own, key=lambda i: model.geom_aabb[i][3:].prod()):
         centre, half = model.geom_aabb[i].reshape(2, 3)
         turned = data.geom_xmat[i].reshape(3, 3)
         place, reach = data.geom_xpos[i] + turned @ centre, np.abs(turned) @ half
         top = max(top, place[2] + reach[2])
+        centres.append(place.copy())
         along = int(np.argmax(reach[:2]))
-        place[along] -= 0.9 * reach[along]  # of half the length of a shape: where its mark stands
+        # at the end where the other shapes are, as the hand of a disc; of those alike at the first
+        side = np.sign(np.mean(centres, axis=0)[along] - place[along] - 1e-9 * reach[along])
+        place[along] += 0.9 * side * reach[along]  # of half its length: where its mark stands
     above = 0.04  # of the machine, by which a mark stands above its axis
     place[2] = max(top, place[2]) + above * model.stat.extent
     return body, data.xmat[body].reshape(3, 3).T @ (place - data.xpos[body])

@@ -288,3 +288,10 @@ def test_an_oscillator_that_swings_within_a_block_has_its_mass_and_no_uneven_clo
     log = Log(rate, {"a": AxisLog({"position": position, "force": force})})
     assert Fault.UNEVEN not in {f.fault for f in check_log(log).findings}
     assert first_model({"l": log}, "m", CATALOGUE).axes["a"].mass == pytest.approx(mass, rel=0.15)
+
+
+def test_a_machine_is_called_as_it_is_asked(tmp_path):
+    write_log(drive(), tmp_path / "run.mcap")
+    done = twin("new", "run.mcap", "-o", "m.toml", "--name", "Stage of hall 3", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert load_model(tmp_path / "m.toml").name == "Stage of hall 3"

@@ -302,6 +302,15 @@ def test_a_recording_without_rerun_is_one_line(folder, monkeypatch) -> None:
     assert said.startswith("twin: --rerun needs rerun-sdk, which is not here; pip install")
 
 
+def test_the_setpoint_of_an_axis_that_turns_is_marked_over_its_hand() -> None:
+    stage = Stage.of(of_kind("rotary"))
+    for body, place in stage.marks.values():
+        first = stage.model.body_geomadr[body]
+        own = range(first, first + stage.model.body_geomnum[body])
+        hand = min(own, key=lambda i: stage.model.geom_aabb[i][3:].prod())
+        assert place[:2] @ stage.model.geom_pos[hand][:2] > 0.0
+
+
 @pytest.mark.parametrize("kind", ["mesh", "arm", "rotary", "log alone"])
 def test_a_recording_of_rerun_holds_the_replay(kind, log, tmp_path) -> None:
     pytest.importorskip("rerun", reason="rerun-sdk is not installed (extra rerun)")

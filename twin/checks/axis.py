@@ -81,6 +81,28 @@ class Axis:
         return held_samples(self.log.position)
 
     @cached_property
+    def force_held(self) -> int:
+        """The same of the force; of long holds only where the motion does not answer to them."""
+        longest = 400  # samples, of which a log of some length has enough
+        count = held_samples(self.log.force, longest)
+        return count if count <= 20 or not self._answers_steps(count) else 0
+
+    def _answers_steps(self, count: int) -> bool:
+        """Whether the motion goes with the force as it is, better than with one between its values.
+
+        So it does where a command goes in steps, and not where a reading was held.
+        """
+        force = self.log.force
+        change = np.flatnonzero(np.diff(force)) + 1
+        smooth = np.interp(np.arange(len(force)), change, force[change])
+        left = (
+            float(np.std(fit_dynamics(f, self.regressors, self.kept, 0, self.rare).residual))
+            for f in (self.force, self.smoother.held(smooth))
+        )
+        stepped, between = left
+        return stepped < between
+
+    @cached_property
     def force_noise(self) -> float:
         """White part of the command, N rms."""
         return white_noise(self.log.force)
@@ -388,8 +410,11 @@ def count_of(signal: Array) -> float:
     return 0.0
 
 
-def held_samples(signal: Array) -> int:
-    """For how many samples each value of a signal is held, where it is; else 0."""
+def held_samples(signal: Array, most: int = 20) -> int:
+    """For how many samples each value of a signal is held, where it is; else 0.
+
+    most: such samples; longer holds may be those of a command that goes in steps.
+    """
     changes = np.diff(signal) != 0.0
     if 3 * np.count_nonzero(changes) > 2 * len(signal):  # most from each sample to the next
         return 0
@@ -400,7 +425,7 @@ def held_samples(signal: Array) -> int:
     if np.count_nonzero(steps == 1) > len(steps) // 2:  # so is their median
         return 0
     count = int(np.median(steps))
-    if not 2 <= count <= 20:  # samples of one value; a slower channel is told by its lag
+    if not 2 <= count <= most:
         return 0
     share = np.bincount(change % count).max() / len(change)
     phase = 0.95  # of the changes fall on one of every m samples where a signal is held

@@ -22,13 +22,14 @@ def check_timing(axis: Axis) -> Iterator[LogFinding]:
     # s of lag, which a filter or a bus makes; two samples at least, where so long is fewer
     allowed = max(3e-3, 2.0 / axis.sample_rate)
     columns = axis.log.columns
-    force = axis.lag
+    hold = axis.force_held / axis.sample_rate  # s; on average a held force is late by half of it
+    force = axis.lag if abs(axis.lag - 0.5 * hold) >= 0.5 * hold else 0.0
     if abs(force) > allowed:
         dead_time = -PHYSICAL <= force < 0.0
         what, remedy = _lagging(axis, "the force", force, CAUSED, "force", "position")
         told = axis.warning if dead_time else axis.error
         yield told(Fault.LAG, what, remedy + DEAD_TIME * dead_time)
-    else:
+    elif not hold:
         yield from _steady(axis)
     if "velocity" in columns:
         lag = _lag(axis, axis.smoother.rate(columns["velocity"]), axis.velocity)

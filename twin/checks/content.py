@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.checks.axis import READINGS, Axis, held_samples
+from twin.checks.axis import READINGS, Axis
 from twin.checks.breaks import and_more, held
 from twin.checks.report import WHOLE, Fault, LogFinding, Severity
 from twin.signals import Array, stretches
@@ -213,7 +213,7 @@ def check_command(axis: Axis) -> Iterator[LogFinding]:
     if not axis.moves:
         return
     force, unit = axis.log.force, axis.log.kind.force
-    if count := held_samples(force):
+    if count := axis.force_held:
         yield held(axis, "the force", count)
         return
     least = 0.3 * axis.force_size  # of the command
@@ -275,7 +275,9 @@ def check_saturation(axis: Axis) -> Iterator[LogFinding]:
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
         if extreme == 0.0:  # a drive that is off
             continue
-        stuck = _exactly(axis, force, extreme) or _but_for_noise(axis, sign * axis.force)
+        stuck = _exactly(axis, force, extreme)
+        if stuck is None and not axis.force_held:
+            stuck = _but_for_noise(axis, sign * axis.force)
         if stuck:
             first, seconds = stuck
             yield axis.warning(
@@ -291,7 +293,7 @@ def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | 
     """Start of the first interval at the extreme and length of all, s."""
     starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
     # s at one value exactly; five samples at least, where so long is fewer
-    stuck = lengths >= max(5e-3 * axis.sample_rate, 5)
+    stuck = lengths >= max(5e-3 * axis.sample_rate, 5, 2 * axis.force_held)
     if not stuck.any():
         return None
     return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate

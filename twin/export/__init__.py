@@ -136,10 +136,24 @@ def axis_identifiers(model: MachineModel) -> dict[str, str]:
     return names
 
 
+# Words of C, C++ and IEC 61131 and files of an FMU, which no model or axis can be called there.
+TAKEN = {
+    "auto", "bool", "break", "case", "catch", "char", "class", "const", "continue", "default",
+    "delete", "do", "double", "else", "enum", "explicit", "export", "extern", "false", "float",
+    "for", "friend", "goto", "if", "inline", "int", "long", "mutable", "namespace", "new",
+    "operator", "private", "protected", "public", "register", "restrict", "return", "short",
+    "signed", "sizeof", "static", "struct", "switch", "template", "this", "throw", "true",
+    "try", "typedef", "typename", "union", "unsigned", "using", "virtual", "void", "volatile",
+    "while", "model", "fmi2", "array", "by", "byte", "dint", "end", "exit", "function", "lint",
+    "of", "real", "lreal", "repeat", "string", "sint", "then", "time", "to", "type", "until",
+    "udint", "uint", "usint", "var", "with", "word", "and", "or", "xor", "not", "mod",
+}  # fmt: skip
+
+
 def identifier(name: str) -> str:
-    """A name as one of a program: small letters, digits and _."""
+    """A name as one of a program: small letters, digits and _, and no word that it has already."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "model"
-    return plain if plain[0].isalpha() else f"m_{plain}"
+    return plain if plain[0].isalpha() and plain not in TAKEN else f"m_{plain}"
 
 
 def filled(template: str, **values: Any) -> str:

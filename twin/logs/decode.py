@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import zlib
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -125,7 +126,8 @@ def _opened(path: str | Path) -> Iterator[McapFile]:
             yield file
     except Damaged as error:
         raise Damaged(
-            f"{error}; copy the file again, or keep what is intact: twin recover {path} -o GOOD"
+            f"{error}; copy the file again, or keep what is intact: "
+            f"twin recover {shlex.quote(str(path))} -o GOOD"
         ) from error
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency
 from identify.output.frequency import read_off
-from identify.output.numbers import NOTHING, listed, pretty, quantity
+from identify.output.numbers import NOTHING, by_how_much, listed, pretty, quantity
 from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
 from identify.output.report.subject import AxisView
 from identify.results.frequency import by_source
@@ -80,7 +80,7 @@ def worth(view: AxisView) -> list[Block]:
         "final model."
     )
     told = [
-        f"With all but {effect} fed forward, the RMS error is {quantity(gain, unit)} larger."
+        f"With all but {effect} fed forward, the RMS error is {by_how_much(gain, unit)}."
         for effect, gain in found.gains.items()
     ]
     told += [f"Not in it: {effect}, {why}." for effect, why in result.lost[view.name].items()]

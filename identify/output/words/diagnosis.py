@@ -226,6 +226,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     if result.body and axis in result.body.axes:
         corrected = f"with body {result.body.body} as it was found, "
         verdict = capitalised(f"{corrected}{verdict[0].lower()}{verdict[1:]}")
+    plan = result.next_experiments.get(axis)
     advised = found.unexplained or any(f.shape for f in found.findings)
     return Said(
         headline=f"{corrected}{headline_in_words(found)}",
@@ -235,7 +236,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
         shapes=tuple(shape_in_words(f.effect, f.shape) for f in found.findings if f.shape),
         left=tuple(left),
         advice=(advice(found.findings),) if advised else (),
-        commands=() if corrected else tuple(next_commands(found)),
+        commands=() if corrected else tuple(next_commands(found, plan)),
         steps=tuple(step_lines(found)),
         notes=remarks_on(result, axis),
     )

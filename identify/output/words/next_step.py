@@ -83,8 +83,11 @@ def fitted_curves() -> list[str]:
     return [e.name for e in every if e.is_nonparametric and not e.free_shape]
 
 
-def next_commands(found: AxisDiagnosis) -> list[str]:
-    """What to run next, of MODEL and LOG...: of what is named first, else of what is left."""
+def next_commands(found: AxisDiagnosis, plan: Plan | None = None) -> list[str]:
+    """What to run next, of MODEL and LOG...: of what is named first, else of what is left.
+
+    plan: that of the diagnosis, where there is one; what it does not decide no plan is run for.
+    """
     if found.verdict is Verdict.NOTHING_MISSING:
         return []
     if not found.findings:
@@ -94,7 +97,7 @@ def next_commands(found: AxisDiagnosis) -> list[str]:
         f"twin plan MODEL LOG... --axis {found.dataset.axis} --between {finding.effect} "
         f"{finding.tied[0]} -o next.toml"
         for finding in found.missing
-        if finding.tied
+        if finding.tied and (plan is None or plan.decides)
     ]
     return [*plans[:1], WRITE]
 

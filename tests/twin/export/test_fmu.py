@@ -15,6 +15,7 @@ from twin.export import find_exporter
 from twin.export.formats.fmu import WRAPPER
 from twin.feedforward import feedforward
 from twin.model.file import load_model
+from twin.model.machine import MachineModel
 
 STAGE = load_model("proton_xy", CATALOGUE)
 # Of FMI 2.0: those of every FMU, and those of co-simulation.
@@ -152,3 +153,11 @@ def test_fmpy_opens_and_runs_it(archive, tmp_path) -> None:
         step_size=STAGE.period, output_interval=STAGE.period,
     )  # fmt: skip
     assert np.abs(done["x_force"][1:] - wanted()[: N - 1]).max() <= 1e-9 * np.abs(wanted()).max()
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["model", "fmi2", "int", "Modell 1 ü"])
+def test_no_name_of_a_model_is_in_the_way_of_c_or_of_the_format(name):
+    x = STAGE.axes["x"]
+    made = find_exporter("fmu").export(MachineModel(name, {"int": x}, STAGE.sample_rate), {})
+    assert not [r for r in made.lost if r.part == "binary"]
