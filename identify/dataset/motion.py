@@ -253,6 +253,8 @@ class Motion:
             bodies=None if self.bodies is None else self.bodies.during(at),
             as_logged=None if self.as_logged is None else self.as_logged[at],
             beside={a: replace(o, samples=samples) for a, o in self.beside.items()},
+            path=self.path and replace(self.path.during(0, count * samples), samples=samples),
+            slip=None,
         )
 
     def with_force_ahead(self, shift: float) -> Motion:

@@ -26,7 +26,7 @@ from identify.estimation.least_squares import RIDGE
 from identify.estimation.scaling import Scaling
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
-from twin.signals import Array
+from twin.signals import Array, rate
 
 OUT = 2.0  # times the error of any other log, where they have been, from which one stands out
 PEAK = 3.0  # times the largest error of any other moment, from which one stands out
@@ -55,8 +55,8 @@ def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | 
     """The log that disagrees with the others, by a model with its values; None where none does.
 
     It is looked for with test functions of their length and with longer ones, which are quiet.
-    Where the others do not agree without it, the model is what is wrong, and no log. Of a mechanism,
-    whose joints share their logs, none is told.
+    Where the others do not agree without it, the model is what is wrong, and no log. Of a
+    mechanism, whose joints share their logs, none is told.
     """
     if any(log.motion.bodies is not None for log in logs):
         return None
@@ -112,9 +112,9 @@ def _rows(
 def _states(log: PreparedLog) -> Array:
     """Position, velocity, acceleration and its rate (n, 4) by test functions."""
     w, motion = log.test_function, log.motion
-    rate = np.gradient(log.acceleration, w.stride * w.period) if len(log) > 1 else log.acceleration
     means = w.mean(np.stack([motion.position, motion.velocity]))
-    return np.stack([*means, log.acceleration, rate], axis=1)
+    jerk = rate(log.acceleration, w.stride * w.period)
+    return np.stack([*means, log.acceleration, jerk], axis=1)
 
 
 def _against(
