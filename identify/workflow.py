@@ -87,6 +87,19 @@ def first_model(
     return model
 
 
+def odd_logs(logs: GivenLogs) -> dict[str, Dataset]:
+    """The axes of which one log disagrees with the others, by a first model of all of them.
+
+    The datasets hold which and how (``odd``); none where the logs do not tell a first model.
+    """
+    try:
+        given = dict(logs_by_name(logs, Role.TRAINING.value))
+        found = fit(shown_by(given, "machine", load_catalogue()), given).datasets
+    except InputError:
+        return {}
+    return {axis: dataset for axis, dataset in found.items() if dataset.odd}
+
+
 @parallel()
 def fit(
     model: Model,

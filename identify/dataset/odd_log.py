@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+FEWEST = 3  # logs; of two, nobody can tell which of them is wrong
+
 
 @dataclass(frozen=True)
 class Disagreement:

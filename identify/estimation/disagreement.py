@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from identify.dataset.odd_log import Disagreement
+from identify.dataset.odd_log import FEWEST, Disagreement
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.test_function import LOOK
 from identify.estimation.evidence import rms
@@ -31,7 +31,6 @@ from twin.signals import Array, rate
 OUT = 2.0  # times the error of any other log, where they have been, from which one stands out
 PEAK = 3.0  # times the largest error of any other moment, from which one stands out
 ALONE = 1.5  # times the error of any other log, that one parameter of its own takes away
-FEWEST = 3  # logs; of two, nobody can tell which of them is wrong
 MOMENT = 0.1  # of a log; what lasts longer is no moment
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.noise_floor import NoiseFloor
-from identify.dataset.odd_log import Disagreement
 from identify.estimation.confounded import MovedParameter, ParameterShift, Refit
 from identify.estimation.fit import Outcome
 from identify.estimation.intervals import (
@@ -33,6 +32,7 @@ from identify.output.numbers import (
     spaced,
     span,
 )
+from identify.output.words.odd import odd_in_words
 from identify.results.results import FitResult, SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
@@ -197,7 +197,7 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             "of the drive or of its surroundings"
         )
     if dataset.odd:
-        said.append(words(odd_in_words(dataset.odd, dataset)))
+        said.append(odd_in_words(dataset))
     said += [
         f"{log}: the first {quantity(end, 's')} are left out, as their {words('force')} fits "
         "nothing that follows: the axis did not yet move freely. Cut the log, or begin it in motion"
@@ -210,25 +210,6 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
         if part > 0.05  # part of a log beyond the training logs that a reader should know of
     ]
     return tuple(said)
-
-
-def odd_in_words(odd: Disagreement, dataset: Dataset) -> str:
-    """That a log disagrees with the others, by how much, when, and as if what were otherwise."""
-    unit = dataset.units.force
-    errors = f"{quantity(odd.error, unit)} where the others leave at most "
-    when = ""
-    if odd.span:
-        when = " from " + " to ".join(quantity(instant, "s") for instant in odd.span)
-    why = ""
-    if odd.otherwise:
-        label, there, elsewhere = odd.otherwise
-        why = f"; it looks as if {label} were {number(there / elsewhere)} times as large in it"
-    kept = any(log.motion.name == odd.log for log in dataset.logs)
-    what = "leave it out, or find what was otherwise" if kept else "all else is told without it"
-    return (
-        f"{odd.log} disagrees with the other logs{when}: {odd.times:.1f} times their error "
-        f"({errors}{quantity(odd.others, unit)}){why}; {what}"
-    )
 
 
 def channel_delay_in_words(dataset: Dataset) -> str | None:
