@@ -12,7 +12,7 @@ from twin.model.units import AxisUnits
 
 
 def odd_in_words(dataset: Dataset) -> str:
-    """Of a dataset that has an odd log: which it is, how it disagrees, and what was done or is to."""
+    """Of a dataset with an odd log: which it is, how it disagrees, what was done or is to do."""
     assert dataset.odd is not None
     kept = any(log.motion.name == dataset.odd.log for log in dataset.logs)
     what = "leave it out, or find what was otherwise" if kept else "all else is told without it"
