@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,10 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import shortness
 from identify.dataset.preparation import datasets, tell_left_out, telling, those_told
 from identify.dataset.prepared_log import sticks
+from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
+from identify.estimation.disagreement import disagreeing
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
@@ -85,6 +88,19 @@ def first_model(
     return model
 
 
+def odd_logs(logs: GivenLogs) -> dict[str, Dataset]:
+    """The axes of which one log disagrees with the others, by a first model of all of them.
+
+    The datasets hold which and how (``odd``); none where the logs do not tell a first model.
+    """
+    try:
+        given = dict(logs_by_name(logs, Role.TRAINING.value))
+        found = fit(shown_by(given, "machine", load_catalogue()), given).datasets
+    except InputError:
+        return {}
+    return {axis: dataset for axis, dataset in found.items() if dataset.odd}
+
+
 @parallel()
 def fit(
     model: Model,
@@ -145,7 +161,7 @@ def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     dataset, fitted = fit_aligned(axis, dataset)
     dataset, fitted = with_own_noise(fitted, dataset)
     require_finite(fitted.residual, dataset)
-    return dataset, fitted
+    return replace(dataset, odd=disagreeing(fitted.axis, dataset.logs)), fitted
 
 
 @parallel()
@@ -249,11 +265,14 @@ def diagnose(
         model, training, selection, tests, Catalogue([]), test_function, progress, [*known.values()]
     )
     away = departures_of(result.model, result.fits, result.datasets, known, progress)
+    # Of a mechanism the joints share their bodies, which were found at one length.
+    lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
     axes = {}
     for axis, fitted in away.fits.items():
         every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
         of_axis = within(progress, f"diagnosis of {axis}")
-        axes[axis] = away.with_ties(diagnose_axis(fitted, away.datasets[axis], every, of_axis))
+        told = diagnose_axis(fitted, away.datasets[axis], every, of_axis, lengths)
+        axes[axis] = away.with_ties(told)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():

@@ -236,6 +236,27 @@ class Motion:
             beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
+    def in_blocks_of(self, samples: int) -> Motion:
+        """The same in other blocks, of so many samples each."""
+        period = samples * self.sample_period
+        count = self.raw.shape[1] // samples
+        at, raw = slice(count * samples), self.raw[:, : count * samples]
+        track = np.stack([self.position_at_samples(0.5)[at], *raw])
+        start = self.start + 0.5 * (period - self.period)
+        times = start + period * np.arange(count)
+        return replace(
+            self,
+            track=Blocks(track.reshape(3, count, samples).mean(axis=2), raw),
+            others=np.stack([np.interp(times, self.time, other) for other in self.others]),
+            period=period,
+            start=start,
+            bodies=None if self.bodies is None else self.bodies.during(at),
+            as_logged=None if self.as_logged is None else self.as_logged[at],
+            beside={a: replace(o, samples=samples) for a, o in self.beside.items()},
+            path=self.path and replace(self.path.during(0, count * samples), samples=samples),
+            slip=None,
+        )
+
     def with_force_ahead(self, shift: float) -> Motion:
         """The same with its command moved ahead by ``shift`` seconds.
 

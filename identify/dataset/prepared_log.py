@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.drive import added_on_blocks, parts_of
 from identify.dataset.motion import REST_SPEED, Motion
-from identify.dataset.test_function import OVERLAP, TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS, OVERLAP, TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
 from twin.effect import Kind
@@ -64,6 +64,16 @@ class PreparedLog:
         if motion.bodies is not None:
             command -= fine.acceleration(motion.bodies.momentum)
         return cls(motion, test_function, fine, command, acceleration, reach=reach)
+
+    def at_length(self, length: float) -> PreparedLog:
+        """The same log with test functions of another length (s), in blocks that suit them.
+
+        Raises InputError for one that spans too few samples.
+        """
+        motion = self.motion
+        if length < LEAST_BLOCKS * motion.period:
+            motion = motion.in_blocks_of(max(int(length / LEAST_BLOCKS / motion.sample_period), 1))
+        return PreparedLog.of(motion, length, self.reach)
 
     @property
     def reached(self) -> NDArray[np.bool_]:

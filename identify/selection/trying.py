@@ -87,14 +87,15 @@ def tried_beside(
     controls = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")
     screenings = spread(lambda c: c.screen(judged, controls), changes, trying)
-    tried = _refitted(judged, screenings, len({e.kind for e in effects}), progress)
+    looks = judged.dataset.looks
+    tried = _refitted(judged, screenings, looks * len({e.kind for e in effects}), progress)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         progress("trying free curves", 0, 1)
         shapes = [c for c in reshaped_of(judged.fit, judged.dataset) if c.name not in barred]
         curves = [c.screen(judged, controls) for c in shapes]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, len(curves), progress, tried)
+        tried += _refitted(judged, best, looks * len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
     trim_memory()
