@@ -76,7 +76,12 @@ HIDDEN: dict[str, tuple[Change, Expected]] = {
             known=KNOWN,
         ),
     ),
-    "ripple": (plain(ripple=0.15), Expected(("force_constant_ripple",), known=KNOWN)),
+    "ripple": (
+        plain(ripple=0.15),
+        Expected(
+            ("force_constant_ripple",), ("position_dependent_force_constant",), known=KNOWN
+        ),
+    ),
     "spring": (sprung, Expected(("spring",), ("cable_slab", "gravity"), known=KNOWN)),
     "flexible": (flexible, Expected(("flexible_mode",), ("base_vibration",), known=KNOWN)),
     "lag": (

@@ -58,7 +58,7 @@ def _in_c() -> list[Figure]:
     for effect in catalogue.values():
         own = Fitted.at_start(effect, moderate(effect, rng))
         beside = () if "FRICTION" in str(effect.kind) else (rubbing,)
-        if not effect.reads_other_axis:
+        if not (effect.reads_other_axis or effect.channels):
             axes[effect.name] = AxisModel(3.0, effects=(*beside, own))
     made = c_source(MachineModel("all", axes, 1.0 / PERIOD))
     stage = c_source(load_model("proton_xy", catalogue))

@@ -30,13 +30,12 @@ from benchmarks.judgement import (
 )
 from benchmarks.real_machines import EXAMPLES, Given
 from identify.estimation.variable_projection import usable
-from identify.links import Suspects
 from identify.results.results import Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding
 from identify.workflow import diagnose
 from twin.effect import Kind
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
@@ -299,7 +298,8 @@ def run(case: Case, data: Path) -> Row:
         return row_of(case.name, case.expected, found, process_time() - begun)
     dataset, base = fitted(model, case.axis, *case.given(data))
     # One joint alone: its torque constant has its rivals, the bodies, on the others.
-    offered = Suspects().offered(usable(CATALOGUE, model), case.axis)
+    known = usable(CATALOGUE, model)
+    offered = Catalogue([e for e in known.values() if e.name != "torque_constant"])
     found = diagnose_axis(base, dataset, offered)
     return row_of(case.name, case.expected, found, process_time() - begun)
 

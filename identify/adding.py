@@ -8,7 +8,8 @@ from functools import partial
 from identify.dataset.given_logs import require_moving
 from identify.estimation.free_curves import having_shape
 from identify.estimation.offered import require_shown
-from identify.links import corrected, suspects_of
+from identify.mechanism.bodies import corrected
+from identify.mechanism.departures import departures_of
 from identify.output.words.next_step import axis_in_words, notes_in_words
 from identify.results.results import (
     Addition,
@@ -27,7 +28,6 @@ from twin.errors import InputError
 from twin.logs import GivenLogs
 from twin.model.file import as_model
 from twin.model.machine import AxisModel
-from twin.mujoco.written import inertial
 from twin.parallel import Progress, parallel, silent
 
 
@@ -136,10 +136,10 @@ def correct_body(
     test_function: float | None = None,
     progress: Progress = silent,
 ) -> CorrectedBody:
-    """The inertia that a body has by the logs, written into a copy of the machine's MuJoCo file.
+    """The inertia that bodies have by the logs, written into a copy of the machine's MuJoCo file.
 
-    file: name of the copy. Raises InputError where the axes are no joints, where the logs prove no
-    body to be another than in the file, and where no body can have the inertia found.
+    file: name of the copy. Raises InputError where the axes are no joints, and where the logs prove
+    no body to be another than in the file.
     """
     model = as_model(model)
     if not model.joints:
@@ -150,15 +150,14 @@ def correct_body(
     before = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    found = suspects_of(before.model, before.fits, before.datasets, progress).body
-    if found is None or found.element is None:
-        what = "prove no body" if found is None else f"tell too little of body {found.body}"
+    found = departures_of(before.model, before.fits, before.datasets, load_catalogue(), progress)
+    if not found.bodies:
         raise InputError(
-            f"{model.mjcf_name}: the logs {what} to correct it; `twin diagnose` says what they show"
+            f"{model.mjcf_name}: the logs prove no body to correct it; `twin diagnose` says what "
+            "they show"
         )
-    element = inertial(*found.element)
-    made = corrected(before.model, found, element, file)
-    return CorrectedBody(made, before.model, found, element)
+    made = corrected(before.model, found.bodies, found.fits, file)
+    return CorrectedBody(made, before.model, found.bodies)
 
 
 def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:

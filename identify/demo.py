@@ -157,4 +157,4 @@ def hidden_machine(
 
 def _can_hide(effect: Effect) -> bool:
     kinds = (Kind.FORCE, Kind.MODIFIER, Kind.ACTUATION)
-    return effect.kind in kinds and not effect.is_nonparametric
+    return effect.kind in kinds and not (effect.is_nonparametric or effect.channels)

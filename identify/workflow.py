@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from identify.analysis.cable_force import cable_force as cable_force
 from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
 from identify.analysis.first_model import Masses, unused
 from identify.analysis.first_model import first_model as shown_by
+from identify.analysis.recording import Recording, misassigned
 from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
@@ -18,8 +20,10 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import shortness
 from identify.dataset.preparation import datasets, tell_left_out, telling, those_told
 from identify.dataset.prepared_log import sticks
+from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
+from identify.estimation.disagreement import disagreeing
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
@@ -31,7 +35,7 @@ from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
-from identify.links import is_better, suspects_of
+from identify.mechanism.departures import departures_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.results.frequency import FrequencyResponse
@@ -82,6 +86,19 @@ def first_model(
     model = shown_by(given, name, known, mass=mass)
     tell_left_out(unused(model, given))
     return model
+
+
+def odd_logs(logs: GivenLogs) -> dict[str, Dataset]:
+    """The axes of which one log disagrees with the others, by a first model of all of them.
+
+    The datasets hold which and how (``odd``); none where the logs do not tell a first model.
+    """
+    try:
+        given = dict(logs_by_name(logs, Role.TRAINING.value))
+        found = fit(shown_by(given, "machine", load_catalogue()), given).datasets
+    except InputError:
+        return {}
+    return {axis: dataset for axis, dataset in found.items() if dataset.odd}
 
 
 @parallel()
@@ -144,7 +161,7 @@ def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     dataset, fitted = fit_aligned(axis, dataset)
     dataset, fitted = with_own_noise(fitted, dataset)
     require_finite(fitted.residual, dataset)
-    return dataset, fitted
+    return replace(dataset, odd=disagreeing(fitted.axis, dataset.logs)), fitted
 
 
 @parallel()
@@ -241,21 +258,21 @@ def diagnose(
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
     known = usable(catalogue, model)
-    parts = as_given(physics_alone(model), logs, holdout, test)
-    result = fit_as_given(*parts, Catalogue([]), test_function, progress, [*known.values()])
-    suspects = suspects_of(result.model, result.fits, result.datasets, progress)
-    told = {a: offered(result.given.axes[a], d, known) for a, d in result.datasets.items()}
-    every = {axis: suspects.offered(known, axis) for axis, known in told.items()}
-    body = suspects.body
-    if body is None or not body.explains_all:
-        axes = _diagnosed(result.fits, result.datasets, every, progress)
-    if body is not None:
-        with_it = within(progress, f"with another {body.body}")
-        beside = _diagnosed(body.fits, body.datasets, every, with_it)
-        if body.explains_all or is_better(beside, axes):
-            axes = beside
-        else:
-            body = None
+    model, *given = as_given(physics_alone(model), logs, holdout, test)
+    recording = misassigned(model, next(iter(given[0].values()))) if model.joints else None
+    training, selection, tests = (_read(part, recording) for part in given)
+    result = fit_as_given(
+        model, training, selection, tests, Catalogue([]), test_function, progress, [*known.values()]
+    )
+    away = departures_of(result.model, result.fits, result.datasets, known, progress)
+    # Of a mechanism the joints share their bodies, which were found at one length.
+    lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
+    axes = {}
+    for axis, fitted in away.fits.items():
+        every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
+        of_axis = within(progress, f"diagnosis of {axis}")
+        told = diagnose_axis(fitted, away.datasets[axis], every, of_axis, lengths)
+        axes[axis] = away.with_ties(told)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():
@@ -263,7 +280,7 @@ def diagnose(
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
-    prepared = result.datasets if body else {axis: d.dataset for axis, d in axes.items()}
+    prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
     found = Diagnosis(
         fitted=model,
         axes=axes,
@@ -274,24 +291,18 @@ def diagnose(
         not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
-        body=body,
+        bodies=away.bodies,
+        recording=recording,
     )
     _ = found.model  # it is complete: to tell it computes nothing
     return found
 
 
-def _diagnosed(
-    fits: Mapping[str, Fit],
-    found: Mapping[str, Dataset],
-    offered: Mapping[str, Catalogue],
-    progress: Progress,
-) -> dict[str, AxisDiagnosis]:
-    return {
-        axis: diagnose_axis(
-            fit, found[axis], offered[axis], within(progress, f"diagnosis of {axis}")
-        )
-        for axis, fit in fits.items()
-    }
+def _read(logs: Mapping[str, Log], recording: Recording | None) -> Mapping[str, Log]:
+    """Logs as they are read right."""
+    if recording is None:
+        return logs
+    return {name: recording.read(log) for name, log in logs.items()}
 
 
 def _begun(

@@ -162,8 +162,12 @@ def built_dataset(*names: str, held: Sequence[str] = (), window: float = 0.04) -
             for i, n in enumerate(which)
         )
 
-    seen = Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD, fewest_cycles=2.5)
-    return Dataset("x", logs(names or ("run",), 1), logs(held, 11), lambda: seen)
+    return Dataset("x", logs(names or ("run",), 1), logs(held, 11), seen)
+
+
+def seen() -> Excitation:
+    """What the motion of the logs covers."""
+    return Excitation(-0.05, 0.05, 0.4, 0.3, 3.0, PERIOD, fewest_cycles=2.5)
 
 
 def built_machine(

@@ -18,7 +18,7 @@ from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
-from identify.links import WrongBody
+from identify.mechanism.bodies import WrongBody
 from identify.results.results import (
     Addition,
     AxisSummary,
@@ -232,7 +232,7 @@ def wrong_body() -> WrongBody:
     errors = {"x": errors_of(0.56, 0.0022), "y": errors_of(3.16, 0.02)}
     return WrongBody(
         "fore", "y", ("upper",), ("x", "y"), inertial, change, band, score_of(0.98, 14.0, 0.3),
-        errors, {}, {},
+        errors,
     )  # fmt: skip
 
 

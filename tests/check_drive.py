@@ -45,6 +45,9 @@ def drive(
         "setpoint_position": motion,
         "setpoint_velocity": lambda t: motion(t, 1),
         "setpoint_acceleration": lambda t: motion(t, 2),
+        "pressure": lambda t: 2e5 + 3e3 * np.sin(0.7 * t),
+        "pressure_2": lambda t: 1e5 + 2e3 * np.sin(0.9 * t),
+        "temperature": lambda t: 295.0 + 0.1 * t,
     }
     columns = {
         name: (factor or {}).get(name, 1.0) * of[name](t - (late or {}).get(name, 0.0))

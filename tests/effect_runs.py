@@ -27,7 +27,7 @@ def with_all(model: MachineModel, rng: np.random.Generator) -> MachineModel:
     """
     for name, axis in model.axes.items():
         for effect in CATALOGUE.values():
-            if effect.kind is not Kind.FRICTION:
+            if effect.kind is not Kind.FRICTION and not effect.channels:
                 axis = axis.with_effect(Fitted.at_start(effect, moderate(effect, rng, 0.1)))
         model = model.with_axis(name, axis)
     return model

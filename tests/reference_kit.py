@@ -41,6 +41,9 @@ class Columns:
     acc: Array
     load: Array
     speeds: Array
+    pressure: Array
+    pressure_2: Array
+    temperature: Array
 
     def __len__(self) -> int:
         return len(self.x)

@@ -70,6 +70,12 @@ def force_constant_ripple(p: Values, q: Columns) -> Results:
     return {U: q.u * (1.0 + fourier(p, q.x / p["p"]))}
 
 
+@written_from("u_actual = u (1 + P(x));  P(x) = sum_k c_k cos(k pi (x - start)/length)")
+def position_dependent_force_constant(p: Values, q: Columns) -> Results:
+    along = np.clip((q.x - p["start"]) / p["length"], 0.0, 1.0)
+    return {U: q.u * (1.0 + np.cos(np.pi * np.outer(along, np.arange(1, 6))) @ numbered(p, "c"))}
+
+
 @written_from("Fc, Fs -> (1 + sum_{k=1,2} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)) Fc, Fs")
 def friction_ripple(p: Values, q: Columns) -> Results:
     return {DRY: q.dry * (1.0 + fourier(p, q.x / p["p"]))}
@@ -279,6 +285,24 @@ def load_dependent_friction(p: Values, q: Columns) -> Results:
     loads = np.stack([np.abs(q.u), np.abs(q.a_other), q.x_other], 1)
     factor = 1.0 + loads @ [p["motor"], p["corner"], p["offset"]]
     return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
+
+
+@written_from("F = area p + area_2 p_2")
+def pressure_force(p: Values, q: Columns) -> Results:
+    return {OUT: np.stack([q.pressure, q.pressure_2], 1) @ [p["area"], p["area_2"]]}
+
+
+@written_from("Fc, Fs -> Fc, Fs (1 + growth |p| + growth_2 |p_2|)")
+def pressure_friction(p: Values, q: Columns) -> Results:
+    factor = 1.0 + np.abs(np.stack([q.pressure, q.pressure_2], 1)) @ [p["growth"], p["growth_2"]]
+    return {DRY: q.dry * np.where(factor < 0.01, 0.01, factor)}
+
+
+@written_from("Fc, Fs -> Fc, Fs (1 - dry (T - T0));  sigma2 -> sigma2 (1 - viscous (T - T0))")
+def temperature_friction(p: Values, q: Columns) -> Results:
+    kept = [1.0 - p[n] * (q.temperature - p["T0"]) for n in ("dry", "viscous")]
+    dry, viscous = (np.where(k < 0.01, 0.01, k) for k in kept)
+    return {DRY: q.dry * dry, VISCOUS: q.viscous * viscous}
 
 
 @written_from("sigma2 -> sigma2 (1 - loss |v|/(vt + |v|))")

@@ -17,7 +17,7 @@ from twin.effects import load_catalogue
 IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
-    "rules", "dataset", "estimation", "analysis", "frequency", "selection", "links",
+    "rules", "dataset", "estimation", "analysis", "frequency", "selection", "mechanism",
     "validation", "experiment_design", "results", "output", "workflow", "adding", "view", "testing",
     "demo", "cli", "start",
 )  # fmt: skip

@@ -17,9 +17,12 @@ It is plain Python and also compiles, once, to native code (see twin.core.native
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import inspect
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +30,7 @@ from types import FunctionType
 from typing import Any
 
 from twin.curve import Curve, FreeShape, Part
+from twin.errors import InputError
 from twin.excitation import Excitation as Excitation  # effects' files take it from here
 from twin.knee import Imitation, Knee
 
@@ -55,8 +59,14 @@ ACC = 20  # m/s^2, absolute acceleration of the bodies on the axis
 LOAD = 21  # N, what the bodies of a mechanism take of this joint; zero on a plain axis
 SPEEDS = 22  # m/s, velocities of all joints of a mechanism in the order of its axes; else zero
 MOST_JOINTS = 64
-IO_SIZE = SPEEDS + MOST_JOINTS
+PRESSURE = SPEEDS + MOST_JOINTS  # Pa, as logged; zero where it was not, and so are the next two
+PRESSURE_2 = PRESSURE + 1  # Pa, of the other chamber
+TEMPERATURE = PRESSURE + 2  # K
+IO_SIZE = PRESSURE + 3
 COLUMNS = IO_SIZE  # how many strengths act at a sample; then the number and the weight of each
+
+# What a log may hold beside the motion, in the order of the slots from PRESSURE on.
+CHANNELS = {"PRESSURE": "pressure", "PRESSURE_2": "pressure_2", "TEMPERATURE": "temperature"}
 
 Law = Callable[[Any, Any, Any], None]
 
@@ -116,14 +126,18 @@ class Parameter:
     """Whether it is known by design: a fit holds it, unless the model file says otherwise."""
     at_least: str | None = None
     """Name of a parameter of the same effect that it may not fall below."""
-    start_rule: Callable[[Excitation], float] | None = None
+    start_rule: Callable[[Excitation], float] | None = field(default=None, compare=False)
     """A better start value, in ``unit``, from the motion of the logs."""
-    scan: Callable[[Excitation], Sequence[float]] | None = None
+    scan: Callable[[Excitation], Sequence[float]] | None = field(default=None, compare=False)
     """Values (k,), in ``unit``, that a diagnosis tries, from the motion of the logs."""
     period: bool = False
     """Whether it is a length (m) after which the force repeats along the track."""
     dry: bool = False
     """Whether it is a level (N) of dry friction."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the rules, which are asked for of the effect, and are functions."""
+        return {**self.__dict__, "start_rule": None, "scan": None}
 
     def start_from(self, excitation: Excitation) -> float:
         """Start value for this motion, inside the bounds."""
@@ -198,6 +212,9 @@ class Effect:
     joint_attributes: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
     """Values by name -> attributes of a joint of MuJoCo that hold the effect, or come nearest to
     it: frictionloss, damping, stiffness, springref, armature, in SI units; None: none does."""
+    of_joint: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
+    """Attributes of a joint of MuJoCo, SI units -> values by name of the effect that they are; None
+    where it is another effect to which they are taken over, or none."""
     motor_attributes: Callable[[Mapping[str, float], float], Mapping[str, Sequence[float]]] = (
         lambda values, gear: {}
     )
@@ -239,6 +256,11 @@ class Effect:
                     f"effect {self.name}: its curve is bent by {bend}, which is no fixed parameter"
                 )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """An effect is its file, a number and a size; what is written are functions."""
+        count = next((int(p.start) for p in self.parameters if p.name == ELEMENTS), None)
+        return _again, (self.law.__module__, inspect.getfile(self.law), self.number, count)
+
     @cached_property
     def name(self) -> str:
         """The name of the file that holds the law, and from the second of several on its number."""
@@ -279,6 +301,15 @@ class Effect:
         return slot in self._names
 
     @property
+    def remembers(self) -> bool:
+        """Whether its force depends on the path that the axis came.
+
+        A friction that sticks remembers no more than that it does.
+        """
+        along = self.kind in (Kind.FORCE, *RUBBING)
+        return along and bool(self.states) and not self.sticks
+
+    @property
     def turn(self) -> tuple[int, int]:
         """When a law's turn is within a sample; effects of an equal one keep the model's order.
 
@@ -299,6 +330,11 @@ class Effect:
         """Whether the law depends on the motion of the machine's other axis."""
         return any(self.reads(slot) for slot in ("X_OTHER", "V_OTHER", "A_OTHER"))
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The fields of a log, such as "pressure", that the law reads beside the motion."""
+        return tuple(field for slot, field in CHANNELS.items() if self.reads(slot))
+
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name; KeyError where there is none."""
         return {p.name: p for p in self.parameters}[name]
@@ -309,3 +345,37 @@ class Effect:
             p.name: p.start if excitation is None else p.start_from(excitation)
             for p in self.parameters
         }
+
+
+def load_effect(path: Path) -> Effect:
+    """The effect of a user's file, which is run. Raises InputError where it defines none."""
+    spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: is not a Python file; an effect is one .py file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        if isinstance(error, TypeError) and "Parameter" in reason:
+            reason += (
+                "; a Parameter has a name, unit, start, lower, upper and meaning, in this order"
+            )
+        raise InputError(f"{path}: cannot be loaded as an effect: {reason}") from error
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise InputError(
+            f"{path}: defines no EFFECT of type twin.effect.Effect; "
+            "see the worked example in examples/my_effect.py"
+        )
+    return effect
+
+
+def _again(module: str, file: str, number: int, count: int | None) -> Effect:
+    """The effect of a file, as that one of several, of so many elements."""
+    known = module in sys.modules or module.startswith("twin.")
+    # a user's file, which another process has not read
+    effect: Effect = importlib.import_module(module).EFFECT if known else load_effect(Path(file))
+    sized = effect if count is None or effect.of_size is None else effect.of_size(count)
+    return sized.numbered(number)

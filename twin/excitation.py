@@ -65,6 +65,10 @@ class Excitation:
     """Least change of position that the readings tell from their rounding and noise, m."""
     longest: float | None = None
     """Duration of the longest log, s; of all of them where None."""
+    both_ways: float = 1.0
+    """Of the places that the axis passed, the part that it passed both ways, 0..1."""
+    temperature: float = 293.15
+    """Mean of what was logged of it, K."""
     fewest_cycles: float = 1.0
     """Cycles that have to be seen of what is said to repeat."""
 

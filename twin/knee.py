@@ -23,7 +23,7 @@ class Imitated(Enum):
     INERTIA = "an inertia"
     LOAD_ON_SPRING = "a load on a spring"
     SPRING = "a spring"
-    OF_POSITION = "a smooth force of position"
+    OF_POSITION = "a force of position"
     CONSTANT = "a constant force"
     DRY_FRICTION = "dry friction"
     OF_SPEED = "a friction of the speed alone"

@@ -79,6 +79,15 @@ def bends_at(speed: str, as_: Imitated) -> Knee:
     return at(speed, "m/s", lambda e: (e.speed_least, e.speed_max), as_, as_)
 
 
+def turns_with_direction(as_: Imitated) -> Knee:
+    """Places passed both ways; where all are passed one way, what turns with it turns never."""
+    most = 0.5  # of the places: what most of them tell, the law has at the others
+    return Knee(
+        "share of places passed both ways", "1", lambda v, e: e.both_ways,
+        lambda v, e: (most, 1.0), below=as_,
+    )  # fmt: skip
+
+
 # --- friction -------------------------------------------------------------------------------------
 
 COULOMB_LEVEL = Parameter(
@@ -238,6 +247,43 @@ def ripple(p, position):
     """Two harmonics of the period p[0], m, with the strengths p[1] to p[4]."""
     sine, cosine, sine2, cosine2, _, _ = harmonics(position, p[0])
     return p[1] * sine + p[2] * cosine + p[3] * sine2 + p[4] * cosine2
+
+
+def along_track(p, position):
+    """Smooth profile along a track that begins at p[0], m, and is p[1], m, long: five cosines.
+
+    Their strengths are p[2] to p[6]. Over the track their mean is zero, so that they do not compete
+    with what they change; beyond it the profile stays as it is.
+    """
+    along = min(max((position - p[0]) / p[1], 0.0), 1.0)
+    double = 2.0 * cos(pi * along)
+    # Clenshaw's recurrence for a cosine series
+    last = p[6]
+    b4 = p[5] + double * last
+    b3 = p[4] + double * b4 - last
+    b2 = p[3] + double * b3 - b4
+    b1 = p[2] + double * b2 - b3
+    return 0.5 * double * b1 - b2
+
+
+TRACK = (
+    Parameter(
+        "start", "m", -0.17, -MOST, MOST, "where the profile begins", fixed=True,
+        start_rule=lambda e: e.position_low,
+    ),
+    Parameter(
+        "length", "m", 0.34, LEAST, MOST, "length of the profile", fixed=True,
+        start_rule=lambda e: e.travel,
+    ),
+)  # fmt: skip
+
+
+def cosine_terms(most: float) -> tuple[Parameter, ...]:
+    """Strengths of a profile along the track, none larger than ``most``."""
+    return tuple(
+        Parameter(f"c{k}", "1", 0.0, -most, most, f"cosine term {k}", strength=True)
+        for k in range(1, 6)
+    )
 
 
 RIPPLE_CYCLES = 70  # most over the travel of a ripple, that are tried before a model tells them

@@ -31,7 +31,7 @@ class Plant(NamedTuple):
     asymmetry, modulation: parts of the friction. cogging, second: N, at pitch and other. weight: N
     times the sine of the position. ripple: part of the force. lag: s. load, coupling, loss: kg, N/m
     and N s/m of a mass on a spring. far: part of the load's place in the logged reading. delay: s,
-    of the command.
+    of the command. tilt: N, always. push: N, by a hand from 0.4 to 0.45 of the time.
     """
 
     mass: float
@@ -56,6 +56,8 @@ class Plant(NamedTuple):
     loss: float = 0.0
     far: float = 0.0
     delay: float = 0.0
+    tilt: float = 0.0
+    push: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,7 @@ def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  
         0.0,
     )
     asked, given, total = 0.0, 0.0, 0.0
+    held = 0.4 * len(path), 0.45 * len(path)
     for i in range(len(read) * each):
         if i % control == 0:
             reading = encoder * np.round(x / encoder)
@@ -191,7 +194,9 @@ def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  
         slid = v - p.stiffness * abs(v) / g * z
         z = min(max(z + dt * slid, -g / p.stiffness), g / p.stiffness)
         force = p.stiffness * z + 2.0 * PRELOAD * np.sqrt(p.stiffness * p.mass) * slid
-        force += p.viscous * v + p.weight * np.sin(x) + p.spring * x
+        force += p.viscous * v + p.weight * np.sin(x) + p.spring * x + p.tilt
+        if held[0] <= i < held[1]:
+            force += p.push
         force += p.cogging * np.sin(TURN * x / p.pitch + 0.3)
         force += p.second * np.sin(TURN * x / p.other + 1.1)
         if p.hysteresis > 0.0:

@@ -86,7 +86,7 @@ def plantable(catalogue: Catalogue) -> list[str]:
     """Physical effects that the stage of the self-test lacks, under the names that fit it."""
     axis = load_model(STAGE, catalogue).axes[AXIS]
     absent = (e for e in catalogue.values() if e.name not in axis.names and axis.can_have(e))
-    return [e.name for e in absent if not e.is_nonparametric]
+    return [e.name for e in absent if not (e.is_nonparametric or e.channels)]
 
 
 def _pairs(names: Sequence[str]) -> list[tuple[str, ...]]:

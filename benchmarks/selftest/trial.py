@@ -169,7 +169,7 @@ def answer_of(finding: Finding, made: Machine, case: Case) -> Answer:
     """
     names = (finding.effect, *finding.tied)
     match finding.kind:
-        case FindingKind.MISSING:
+        case FindingKind.MISSING | FindingKind.WRONG_VALUE:
             right = not {*case.effects, *made.right}.isdisjoint(names)
             right |= not {*made.reshaped}.isdisjoint(finding.tied)
         case FindingKind.WRONG_SHAPE:

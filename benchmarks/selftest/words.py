@@ -35,6 +35,7 @@ ANSWERS = {
     FindingKind.MISSING: "{}",
     FindingKind.WRONG_SHAPE: "{} of another shape",
     FindingKind.RESEMBLES: "something like {}",
+    FindingKind.WRONG_VALUE: "{} of another value",
 }
 
 

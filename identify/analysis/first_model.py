@@ -22,7 +22,7 @@ from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
 from identify.estimation.evidence import rms
 from identify.estimation.least_squares import orthonormal, unabsorbed
-from twin.effect import LEAST, MOST, Excitation, Kind
+from twin.effect import LEAST, MOST, Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.logs import Log
@@ -273,7 +273,39 @@ def first_model(
         for a, (going, _) in told.items()
         if going
     }
-    return replace(begun, axes={**begun.axes, **axes})
+    return with_stated(replace(begun, axes={**begun.axes, **axes}), catalogue)
+
+
+def with_stated(model: MachineModel, catalogue: Catalogue) -> MachineModel:
+    """The model with what its MuJoCo file states of its joints, at the values of the file.
+
+    Rotors and springs are held, as the masses of the file are; friction is not, which no file knows
+    for long: its values are those to begin with.
+    """
+    if not model.joints:
+        return model
+    from twin.mujoco.stated import stated_in  # MuJoCo takes long to load
+
+    for axis, attributes in stated_in(model).items():
+        for effect in catalogue.values():
+            if effect.of_joint is None:
+                continue
+            values = effect.of_joint(attributes)
+            if effect.is_present({**effect.starts(), **values}):
+                own = _as_stated(model.axes[axis], effect, values)
+                model = model.with_axis(axis, own)
+    return model
+
+
+def _as_stated(axis: AxisModel, effect: Effect, values: Mapping[str, float]) -> AxisModel:
+    """An axis with an effect at the values of the file; of a friction those that are not 0."""
+    if effect.kind is not Kind.FRICTION:
+        law = Fitted.at_start(effect, values, axis.units)
+        return axis.with_effect(replace(law, fixed=frozenset(law.values)))
+    known = axis.friction if axis.friction and axis.friction.effect.name == effect.name else None
+    given = {n: v for n, v in values.items() if v}
+    begun = {} if known is None else known.values
+    return axis.with_effect(Fitted.at_start(effect, {**begun, **given}, axis.units))
 
 
 def unused(model: MachineModel, logs: Mapping[str, Log]) -> dict[str, str]:

@@ -120,7 +120,7 @@ def compare(
     done = with_logs(job, machine, logs)
     if html:
         source = _source(model, test_function, effects)
-        _report(html, f"{machine.name}: model against measurement", source, done, logs)
+        _report(html, source, done, logs)
     if mcap:
         workflow.side_by_side_of(done.result).write(mcap)
     return said_of(done.result, done.warnings, left_out=done.left_out)
@@ -155,7 +155,7 @@ def diagnose(
         _source(model, test_function, effects), written=str(better) if better else None
     )
     if html:
-        _report(html, f"{machine.name}: what the model lacks", source, done, logs)
+        _report(html, source, done, logs)
     if better:
         _save_with_bodies(done.result.model, better, machine)
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
@@ -184,23 +184,19 @@ def _save_with_bodies(made: MachineModel, out: Path, given: MachineModel) -> Non
 
 
 def _report(
-    out: Path, title: str, source: Source, done: Done[Comparison] | Done[Diagnosis],
-    logs: Sequence[Path],
-) -> None:  # fmt: skip
+    out: Path, source: Source, done: Done[Comparison] | Done[Diagnosis], logs: Sequence[Path]
+) -> None:
     """Write the report of a result, with what its model says of the loop on these logs."""
     from identify import workflow
     from identify.output.report import write_report
     from identify.output.report.subject import Subject
 
-    result = done.result
-    after, before, history = result.model, None, result.model.history
+    result, before = done.result, None
     if isinstance(result, workflow.Diagnosis):
-        before, history = result.fitted if result.effect else None, result.fitted.history
+        before = result.fitted if result.effect else None
     with progress_on_stderr() as progress, left_out():  # what says nothing was told already
-        known = workflow.on_machine(after, Recordings(logs), before, progress=progress)
-    findings = done.findings
-    subject = Subject(title, result, history, (), source, machine=known, findings=findings)
-    write_report(out, subject)
+        known = workflow.on_machine(result.model, Recordings(logs), before, progress=progress)
+    write_report(out, Subject.of(result, source, machine=known, findings=done.findings))
 
 
 @app.command()
@@ -236,7 +232,7 @@ def add(
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
     from identify import adding
-    from identify.links import LINK_MASS
+    from identify.mechanism.bodies import LINK_MASS
     from identify.output.as_json import found_in
 
     machine, catalogue = loaded(model, effects)

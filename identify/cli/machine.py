@@ -108,8 +108,9 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined, unused
-    from identify.analysis.joint_signs import misassigned
+    from identify.analysis.recording import misassigned
     from identify.output.answers.machine import NewModelAnswer
+    from identify.output.words.recording import recording_in_words
     from twin.effects import load_catalogue
     from twin.files import kept_beside
     from twin.model.file import format_model, read_mjcf, save_model
@@ -134,7 +135,7 @@ def new(
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, logs[0])}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
-    doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
+    doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
@@ -185,13 +186,20 @@ def info(
 def check(logs: Logs) -> Said:
     """Say whether logs are fit for identification, what is wrong with them, and which are copies.
 
+    Of three logs or more also which one disagrees with the others.
+
     Example: twin check run.mcap
     """
+    from identify.dataset.odd_log import FEWEST
     from identify.output.answers.machine import check_answer
     from identify.output.machine import check_text
+    from identify.output.words.odd import with_odd
+    from identify.workflow import odd_logs
     from twin.checks.long import check_files
 
     reports = check_files(logs)
+    if len(logs) >= FEWEST and all(report.ok for report in reports.values()):
+        reports = with_odd(reports, odd_logs(logs))
     answer = check_answer(reports)
     return Said(check_text(reports), answer, fine=answer.ok)
 

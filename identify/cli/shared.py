@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from twin.model.machine import MachineModel
 
 Result = TypeVar("Result")
-MEASURED = ("position", "velocity", "setpoint_position", "current", "force")
+MEASURED = (
+    "position", "velocity", "setpoint_position", "current", "force", "pressure", "pressure_2",
+    "temperature",
+)  # fmt: skip
 
 app = Commands(
     help="Find out why the model and the machine disagree.",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.readings import FEWEST_CYCLES
 from identify.dataset.spectrum import Record, find_lines, lines_in_time
 from identify.rules import RULE
-from twin.effect import Excitation
+from twin.effect import CHANNELS, Excitation
 from twin.excitation import Repeating
 from twin.signals import Array
 
@@ -42,9 +42,12 @@ def coordinates_of(log: PreparedLog) -> dict[str, Array]:
         "time": log.time,
         "distance_since_reversal": mean(since_reversal(m.velocity, m.period)),
     }
-    if m.others.any():
-        for name, row in zip(QUANTITIES, m.others, strict=True):
+    if m.others[:3].any():
+        for name, row in zip(QUANTITIES, m.others[:3], strict=True):
             out[f"{OTHER}{name}"] = mean(row)
+    for name, row in zip(CHANNELS.values(), m.others[3:], strict=False):
+        if name in m.channels:
+            out[name] = mean(row)
     for axis, other in m.beside.items():
         for name, row in zip(QUANTITIES, other.signals, strict=True):
             out[beside(axis, name)] = mean(row)
@@ -66,6 +69,24 @@ def gathered(logs: Sequence[PreparedLog]) -> dict[str, Array]:
     parts = [coordinates_of(log) for log in logs]
     common = [k for k in parts[0] if all(k in p for p in parts)]
     return {k: np.concatenate([p[k] for p in parts]) for k in common}
+
+
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """What the motions of one axis cover together, found where it is asked for.
+
+    travel: m, of the axis where it is known.
+    """
+
+    motions: tuple[Motion, ...]
+    travel: tuple[float, float] | None
+
+    def __call__(self) -> Excitation:
+        return self._found
+
+    @cached_property
+    def _found(self) -> Excitation:
+        return excitation(self.motions, self.travel)
 
 
 def excitation(motions: Sequence[Motion], travel: tuple[float, float] | None) -> Excitation:
@@ -113,9 +134,27 @@ def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = No
         force_usual=float(np.median(driven[speed >= slow])),
         resolution=max(m.resolution for m in motions),
         shortest=max(_told(m) for m in motions),
+        both_ways=_both_ways(np.concatenate([m.position for m in motions]), velocity, fast),
+        temperature=_temperature(motions),
         fewest_cycles=RULE.fewest_cycles,
         other_joints=_other_joints(motions[0]),
     )
+
+
+def _both_ways(position: Array, velocity: Array, fast: float) -> float:
+    """Of the places that were passed, the part that was passed both ways; fast: m/s, that count."""
+    places = 50  # along the track, as many as a smooth curve may tell apart
+    edges = np.linspace(position.min(), position.max(), places + 1)
+    ways = [np.histogram(position[way * velocity > fast], edges)[0] > 0 for way in (1.0, -1.0)]
+    both, either = np.all(ways, axis=0).sum(), np.any(ways, axis=0).sum()
+    return float(both / max(either, 1))
+
+
+def _temperature(motions: Sequence[Motion]) -> float:
+    """Mean of what the logs hold of it, K; that of a room where they do not."""
+    row = 3 + [*CHANNELS.values()].index("temperature")
+    logged = [m.others[row] for m in motions if "temperature" in m.channels]
+    return float(np.mean(np.concatenate(logged))) if logged else 293.15
 
 
 def _told(motion: Motion) -> float:

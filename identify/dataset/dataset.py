@@ -11,7 +11,8 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.prepared_log import PreparedLog
+from identify.dataset.odd_log import Disagreement
+from identify.dataset.prepared_log import EVERYWHERE, PreparedLog
 from twin.effect import Excitation
 from twin.model.units import AxisUnits
 
@@ -37,7 +38,9 @@ class Dataset:
     is decided. covered: gives what the training logs cover, which takes a while. channel_delay: s,
     by which the force of the logs was shifted to earlier samples. left_out: the logs that say
     nothing, by name, with the reason of each. begun: s that were left out at the beginning of logs,
-    by name, as the axis did not yet move freely.
+    by name, as the axis did not yet move freely. looks: how many lengths of the test functions were
+    looked at, of which one may show by chance what the others do not. odd: a log that disagrees
+    with the others; a diagnosis is made without it.
     """
 
     axis: str
@@ -48,6 +51,8 @@ class Dataset:
     left_out: Mapping[str, str] = field(default_factory=dict)
     begun: Mapping[str, float] = field(default_factory=dict)
     test: tuple[PreparedLog, ...] = ()
+    looks: int = 1
+    odd: Disagreement | None = None
 
     @property
     def beyond(self) -> dict[str, float]:
@@ -79,6 +84,30 @@ class Dataset:
         others = iter(logs)
         training, selection, test = (tuple(islice(others, len(self.having(role)))) for role in Role)
         return replace(self, training=training, selection=selection, test=test)
+
+    def without(self, name: str) -> Dataset:
+        """The same without a log; one of the next role trains where none is left.
+
+        Without selection logs, blocks of the training logs choose.
+        """
+        training, selection, test = (
+            tuple(log for log in self.having(role) if log.motion.name != name) for role in Role
+        )
+        if not training:
+            training, selection = selection[:1], selection[1:]
+        if not training:
+            training, test = test[:1], test[1:]
+        training = tuple(replace(log, reach=EVERYWHERE) for log in training)
+        return replace(self, training=training, selection=selection, test=test)
+
+    def at_length(self, length: float) -> Dataset:
+        """The same with test functions of another length (s), which is one look more.
+
+        Raises InputError where the logs have too few samples for it.
+        """
+        return replace(
+            self.with_logs(log.at_length(length) for log in self.logs), looks=self.looks + 1
+        )
 
     def forget(self) -> None:
         """Let go of what is made of the columns of its logs, where these are held."""

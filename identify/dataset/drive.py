@@ -41,11 +41,11 @@ def knows_rounding(axis: AxisModel, motions: Sequence[Motion]) -> bool:
 def actual_force(axis: AxisModel, motion: Motion) -> Array:
     """The command after the axis' actuation effects, (n,) N at the log's own rate."""
     part = parts_of(axis, Kind.ACTUATION)
-    return _behind_command(_Valued.of(part), motion) if part.effects else motion.raw[1]
+    return _behind_command(Valued.of(part), motion) if part.effects else motion.raw[1]
 
 
 @lru_cache(maxsize=8)  # while a fit moves other parameters, the actual force stays
-def _behind_command(actuation: _Valued, motion: Motion) -> Array:
+def _behind_command(actuation: Valued, motion: Motion) -> Array:
     fine = motion.at_samples(0.5)
     return motion.raw[1] + _added(actuation.axis, motion, fine, motion.sample_period)
 
@@ -69,7 +69,7 @@ def _added(actuation: AxisModel, motion: Motion, signals: Array, period: float) 
 
 
 @dataclass(frozen=True)
-class _Valued:
+class Valued:
     """Effects of an axis, the same where their names and values are, and the mass if they read it.
 
     values: of each effect, its name and vector of values.
@@ -80,7 +80,7 @@ class _Valued:
     axis: AxisModel = field(compare=False)
 
     @classmethod
-    def of(cls, axis: AxisModel) -> _Valued:
+    def of(cls, axis: AxisModel) -> Valued:
         """All effects of an axis."""
         values = tuple((f.effect.name, tuple(f.vector())) for f in axis.effects)
         heavy = any(f.effect.reads(slot) for f in axis.effects for slot in ("MASS", "MOVED"))
@@ -95,17 +95,18 @@ def true_motion(axis: AxisModel, motion: Motion) -> tuple[Motion, Array]:
     sensing = [f for f in axis.effects if f.effect.kind is Kind.SENSING and not f.effect.is_noise]
     if not sensing:
         return motion, np.broadcast_to(0.0, motion.raw.shape[1])
-    return _behind(_Valued.of(replace(axis, effects=tuple(sensing))), motion)
+    return _behind(Valued.of(replace(axis, effects=tuple(sensing))), motion)
 
 
 @lru_cache(maxsize=8)  # while a fit moves other parameters, the true motion stays
-def _behind(sensing: _Valued, motion: Motion) -> tuple[Motion, Array]:
+def _behind(sensing: Valued, motion: Motion) -> tuple[Motion, Array]:
     error, rate = reading_error(sensing.axis, motion)
     blocks = motion.signals.copy()
     for block, at_samples in zip(blocks, (error, rate), strict=False):
         block -= at_samples.reshape(blocks.shape[1], -1).mean(axis=1)
     raw = np.stack([motion.raw[0] - rate, motion.raw[1]])
-    return replace(motion, track=Blocks(blocks, raw)), rate
+    path = None if motion.path is None else motion.path.less(error)
+    return replace(motion, track=Blocks(blocks, raw), path=path), rate
 
 
 def reading_error(

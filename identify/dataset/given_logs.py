@@ -13,7 +13,7 @@ from identify.dataset.motion import SHORTEST_LOG, other_axes, shortest_log
 from twin.checks import moves
 from twin.checks.copies import copies
 from twin.errors import InputError
-from twin.logs import Log
+from twin.logs import LINEAR_UNITS, Log
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
@@ -85,6 +85,18 @@ def require_one_kind(logs: Mapping[str, Log], name: str, axis: AxisModel) -> Non
                 f"the model it is {units.kind} (position in {units.position}); give the model "
                 f"{logged.mass_name} in {logged.mass}, or correct the units in the import map"
             )
+
+
+def require_channels(logs: Mapping[str, Log], name: str, axis: AxisModel) -> None:
+    """Raise InputError where a law of an axis reads what a log does not hold of it."""
+    read = {f.effect.name: f.effect.channels[0] for f in axis.effects if f.effect.channels}
+    for log_name, log in logs.items():
+        for law, field in read.items():
+            if name in log.axes and field not in log.axes[name].columns:
+                raise InputError(
+                    f"{log_name}: has no {field} of axis {name}, which {law} reads; import it, as "
+                    f"{field} ({LINEAR_UNITS[field]}) of the axis, or remove {law}"
+                )
 
 
 def is_driven(axis: AxisModel | None) -> bool:

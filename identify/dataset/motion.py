@@ -13,8 +13,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from identify.dataset.bodies import Bodies
+from identify.dataset.path import Path
 from identify.dataset.readings import (
     ENOUGH,
     resolution_of,
@@ -24,6 +26,7 @@ from identify.dataset.readings import (
     together,
 )
 from identify.dataset.test_function import LEAST_BLOCKS
+from twin.effect import CHANNELS
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR
@@ -146,22 +149,35 @@ class OtherAxis:
         return replace(self, readings=self.readings[at.start : at.stop + 1])
 
 
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """What a model moves its laws with memory beside the path of the readings at rest.
+
+    velocity (n,): m/s, by blocks. free (n,): in which blocks the readings let it be any.
+    """
+
+    velocity: Array
+    free: NDArray[np.bool_]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """Motion of one axis over one log, in blocks.
 
     name: of the log. track: its signals. others (3, n): position, velocity, acceleration of the
-    other axis (zero where there is none, or more than one). period: s, of a block. start: s, middle
-    of the first block. sample_period: s, of the log. position_noise: m rms. time_origin: s, when
-    the log began, by the phase of what repeats in time. follows: whether the position follows a
-    logged setpoint; None where none was logged. units, other_units: of the axis and of the other
-    one, by which m, N and so on are to be read. beside: on a machine with more than two axes the
-    others, by name. velocity_weight: 1, of a measured velocity beside the readings
-    (identify.dataset.readings); 0 where there is none. ripples: m, periods at which the readings
-    err along the track (identify.dataset.readings). ahead: s, by which the command was moved ahead
-    of how it was logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a
-    joint of a mechanism, over as many samples as raw; None for a plain axis, whose mass is all that
-    it moves.
+    other axis (zero where there is none, or more than one), and with channels (6, n) these in SI.
+    channels: fields of the log that are among these, such as "pressure"; others are zero. period:
+    s, of a block. start: s, middle of the first block. sample_period: s, of the log.
+    position_noise: m rms. time_origin: s, when the log began, by the phase of what repeats in time.
+    follows: whether the position follows a logged setpoint; None where none was logged. units,
+    other_units: of the axis and of the other one, by which m, N and so on are to be read. beside:
+    on a machine with more than two axes the others, by name. velocity_weight: 1, of a measured
+    velocity beside the readings (identify.dataset.readings); 0 where there is none. ripples: m,
+    periods at which the readings err along the track (identify.dataset.readings). ahead: s, by
+    which the command was moved ahead of how it was logged, as_logged (n * samples a block,) N; None
+    where it was not. bodies: of a joint of a mechanism, over as many samples as raw; None for a
+    plain axis, whose mass is all that it moves. path: what laws with memory follow; None: the
+    readings as they are. slip: what a model moves such laws beside it at rest.
     """
 
     name: str
@@ -182,6 +198,9 @@ class Motion:
     ahead: float = 0.0
     as_logged: Array | None = None
     bodies: Bodies | None = None
+    path: Path | None = None
+    slip: Slip | None = None
+    channels: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -212,7 +231,30 @@ class Motion:
             others=np.ascontiguousarray(self.others[:, blocks]),
             bodies=None if self.bodies is None else self.bodies.during(at),
             as_logged=None if self.as_logged is None else self.as_logged[at],
+            path=None if self.path is None else self.path.during(at.start, at.stop),
+            slip=None,
             beside={a: o.during(blocks) for a, o in self.beside.items()},
+        )
+
+    def in_blocks_of(self, samples: int) -> Motion:
+        """The same in other blocks, of so many samples each."""
+        period = samples * self.sample_period
+        count = self.raw.shape[1] // samples
+        at, raw = slice(count * samples), self.raw[:, : count * samples]
+        track = np.stack([self.position_at_samples(0.5)[at], *raw])
+        start = self.start + 0.5 * (period - self.period)
+        times = start + period * np.arange(count)
+        return replace(
+            self,
+            track=Blocks(track.reshape(3, count, samples).mean(axis=2), raw),
+            others=np.stack([np.interp(times, self.time, other) for other in self.others]),
+            period=period,
+            start=start,
+            bodies=None if self.bodies is None else self.bodies.during(at),
+            as_logged=None if self.as_logged is None else self.as_logged[at],
+            beside={a: replace(o, samples=samples) for a, o in self.beside.items()},
+            path=self.path and replace(self.path.during(0, count * samples), samples=samples),
+            slip=None,
         )
 
     def with_force_ahead(self, shift: float) -> Motion:
@@ -237,6 +279,8 @@ class Motion:
             self.track.forget()
             if self.bodies is not None:
                 self.bodies.forget()
+            if self.path is not None:
+                self.path.forget()
             for name in ("smoothed_position", "unrippled"):
                 self.__dict__.pop(name, None)
 
@@ -264,6 +308,12 @@ class Motion:
     def velocity(self) -> Array:
         """(n,) m/s."""
         return self.signals[1]
+
+    @property
+    def followed(self) -> Array:
+        """Velocity (n,) m/s that laws with memory follow."""
+        own = self.velocity if self.path is None else self.path.velocity
+        return own if self.slip is None else own + self.slip.velocity
 
     @property
     def acceleration(self) -> Array:
@@ -413,7 +463,8 @@ def motion_of(
         name=name,
         axis=axis,
         track=columns.kept if bodies is None else columns,  # of joints there are many
-        others=_none(whole // block) if other is None else other.signals,
+        others=_beside(log.axes[axis], other, whole, block),
+        channels=_channels(log.axes[axis]),
         period=block * log.period,
         start=0.5 * block * log.period,
         sample_period=log.period,
@@ -425,12 +476,29 @@ def motion_of(
         velocity_weight=weight,
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(whole)),
+        path=Path(columns.readings, block, log.period, min(noise, encoder_noise)),
     )
 
 
 def shortest_log(period: float) -> float:
     """Least length (s) of a log for identification, of samples of a period (s)."""
     return max(SHORTEST_LOG, LEAST_BLOCKS**2 * period)
+
+
+def _channels(own: AxisLog) -> tuple[str, ...]:
+    """What a log holds of an axis beside its motion."""
+    return tuple(field for field in CHANNELS.values() if field in own.columns)
+
+
+def _beside(own: AxisLog, other: OtherAxis | None, whole: int, block: int) -> Array:
+    """Signals of the other axis and of channels, by blocks of so many samples of ``whole``."""
+    signals = _none(whole // block) if other is None else other.signals
+    if not _channels(own):
+        return signals
+    none = np.zeros(whole + 1)
+    readings = np.stack([own.columns.get(f, none)[: whole + 1] for f in CHANNELS.values()])
+    middle = 0.5 * (readings[:, 1:] + readings[:, :-1])
+    return np.vstack([signals, middle.reshape(len(middle), -1, block).mean(axis=2)])
 
 
 @lru_cache(maxsize=1)  # the axes of a log share it

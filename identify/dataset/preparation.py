@@ -14,13 +14,14 @@ from itertools import islice
 import numpy as np
 
 from identify.dataset.bodies import Bodies, bodies_along
-from identify.dataset.coordinates import excitation
+from identify.dataset.coordinates import Covered
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
     Given,
     apart,
     is_driven,
     nothing_told,
+    require_channels,
     require_one_kind,
     require_samples,
     telling_in,
@@ -77,6 +78,7 @@ def _prepared(
     for name, axis in model.axes.items():
         for logs in given.values():
             require_one_kind(logs, name, axis)
+            require_channels(logs, name, axis)
         driven, machine = is_driven(axis), tuple(model.axes)
         found = {role: telling_in(g, name, machine, driven=driven) for role, g in given.items()}
         going = {role: telling for role, (telling, _) in found.items()}
@@ -127,7 +129,7 @@ def _of_axis(
         training=tuple(spread(partial(PreparedLog.of, length=length), fit)),
         selection=_within_reach(held, length, fit),
         test=_within_reach(test, length, fit),
-        covered=cache(partial(excitation, fit, axis.hardware.travel)),
+        covered=Covered(tuple(fit), axis.hardware.travel),
         begun=begun,
     )
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.drive import added_on_blocks, parts_of
 from identify.dataset.motion import REST_SPEED, Motion
-from identify.dataset.test_function import OVERLAP, TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS, OVERLAP, TestFunction
 from twin.core.native import Table
 from twin.core.walks import walk_sets
 from twin.effect import Kind
@@ -65,12 +65,30 @@ class PreparedLog:
             command -= fine.acceleration(motion.bodies.momentum)
         return cls(motion, test_function, fine, command, acceleration, reach=reach)
 
+    def at_length(self, length: float) -> PreparedLog:
+        """The same log with test functions of another length (s), in blocks that suit them.
+
+        Raises InputError for one that spans too few samples.
+        """
+        motion = self.motion
+        if length < LEAST_BLOCKS * motion.period:
+            motion = motion.in_blocks_of(max(int(length / LEAST_BLOCKS / motion.sample_period), 1))
+        return PreparedLog.of(motion, length, self.reach)
+
     @property
     def reached(self) -> NDArray[np.bool_]:
         """Which test functions (n,) lie within reach."""
         low, high = self.reach
         position = self.test_function.mean(self.motion.position)
         return np.asarray((position >= low) & (position <= high))
+
+    @property
+    def told(self) -> Array:
+        """How much of each test function (n,) tells of a model: not what balances by itself."""
+        slip = self.motion.slip
+        if slip is None:
+            return np.ones(len(self))
+        return 1.0 - self.test_function.mean(slip.free.astype(float))
 
     @cached_property
     def extent(self) -> tuple[float, Reach, float]:
@@ -99,9 +117,10 @@ def total_forces(table: Table, sets: Array, motion: Motion) -> Array:
     first, last, _, _, _ = table.axes[0]
     if first < last:
         signals = motion.joint_signals if table.reads_joints else motion.signals
+        path = motion.followed if table.remembers.any() else motion.velocity
         walk_sets(
             table.entries, first, last, sets, table.n_states, signals, motion.others,
-            motion.period, 0, totals, table.masses[0], motion.time_origin,
+            motion.period, 0, totals, table.masses[0], motion.time_origin, table.remembers, path,
         )  # fmt: skip
     return totals
 

@@ -18,6 +18,7 @@ from twin.signals import Array, between
 OVERLAP = 4  # test functions that cover one instant
 LEAST_BLOCKS = 8  # that a test function spans
 LOOK = 0.1  # s, its length where none is chosen yet
+SHORTEST = 0.02  # s, within which no log is looked at more closely
 
 
 def require_test_function(length: float | None, longest: float) -> None:

@@ -15,11 +15,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import white_noise_floor
-from identify.dataset.test_function import LEAST_BLOCKS, LOOK, TestFunction
+from identify.dataset.test_function import LEAST_BLOCKS, LOOK, SHORTEST, TestFunction
 from twin.model.machine import INERTIA, MASS, AxisModel
 from twin.signals import Array
 
-TEST_FUNCTIONS = (0.02, 0.05, 0.1, 0.2)  # s, tried in this order
+TEST_FUNCTIONS = (SHORTEST, 0.05, 0.1, 0.2)  # s, tried in this order
 QUIET = 0.01  # largest noise floor, as a part of the force that the inertia does not explain
 FOREIGN = 10.0  # times the RMS of what is left of the force later on
 HELD = 0.1  # of the force itself

@@ -56,14 +56,16 @@ def _shifted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
         if again.error > RULE.fallen * fit.error:
             break
         dataset, fit = moved, again
-    while dataset.channel_delay:  # to its best value, by steps that are too small to tell a delay
+    for _ in range(5 if dataset.channel_delay else 0):  # to its best value, which few steps reach
         last, _, _ = _linear_shift(fit, dataset)
         moved = realigned(dataset, max(dataset.channel_delay + last, 0.0))
         again = replace(fit_axis(fit.axis, moved.training), begun=fit.begun)
-        # 0.999 of the error, below which another fit is a better optimum
-        if again.error > 0.999 * fit.error:
+        # by how much a fit's error is not known, where it ended at another place
+        if again.error > 1.001 * fit.error:
             break
         dataset, fit = moved, again
+        if abs(last) < 1e-3 * dataset.training[0].motion.sample_period:
+            break
     return dataset, fit
 
 

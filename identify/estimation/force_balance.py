@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
 from typing import TypeAlias
 
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.drive import actual_force, parts_of, reading_error, true_motion
-from identify.dataset.motion import Blocks, Motion
+from identify.dataset.drive import Valued, actual_force, parts_of, reading_error, true_motion
+from identify.dataset.motion import Blocks, Motion, Slip
 from identify.dataset.prepared_log import (
     PreparedLog,
     motor_gain,
@@ -29,8 +29,12 @@ from identify.dataset.prepared_log import (
     total_force,
     total_forces,
 )
+from identify.dataset.test_function import SHORTEST
+from identify.dataset.time_scale import QUIET
+from identify.estimation.evidence import rms
 from twin.core.compiled import P_AT
 from twin.core.native import Table
+from twin.core.settling import settle
 from twin.core.walks import averaged_columns, reading_columns
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
@@ -64,6 +68,7 @@ def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
 
 def effect_forces(axis: AxisModel, logs: Sequence[PreparedLog]) -> dict[str, Array]:
     """By name, the force (n,) N that each effect adds to the command: all less all but it."""
+    logs = settled(axis, logs)
     whole = averaged_force(axis, logs)
     return {name: whole - averaged_force(axis.without(name), logs) for name in axis.names}
 
@@ -145,10 +150,57 @@ def _under(motion: Motion, force: Array) -> Motion:
     return replace(motion, track=Blocks(np.stack([*motion.signals[:2], force]), motion.raw))
 
 
+def settled(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[PreparedLog]:
+    """The logs with what laws with memory hold at rest where the readings do not tell it.
+
+    There it is what balances the force, as far as the noise of the readings leaves room for it. A
+    friction that sticks balances it by itself.
+    """
+    hides = [log.motion.path.room if log.motion.path else 0.0 for log in logs]
+    if not any(f.effect.remembers for f in axis.effects) or sticks(axis) or not any(hides):
+        return list(logs)
+    own, force = Valued.of(axis), _held_over(axis, logs[int(np.argmax(hides))].motion, max(hides))
+
+    def one(log: PreparedLog) -> PreparedLog:
+        motion = log.motion
+        matters = motion.slip is None and force > QUIET * rms(motion.net)
+        return _settled(own, log) if matters else log
+
+    return spread(one, logs)
+
+
+@lru_cache(maxsize=16)  # a fit asks for the residual and its derivatives at the same values
+def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
+    axis, motion = own.axis, log.motion
+    table, (driven, _) = _table_between(axis), _driven(axis, log)
+    path = motion.path
+    if path is None:
+        return log
+    acting = true_motion(axis, motion)[0]
+    if _is_apart(axis):
+        acting = acting.with_force(actual_force(axis, acting))
+    signals = driven.joint_signals if table.reads_joints else driven.signals
+    moved = settle(
+        table, signals, driven.others, acting.net, driven.followed, path.stands, path.room,
+        SHORTEST, motion.period, motion.time_origin,
+    )  # fmt: skip
+    slip = Slip(moved / motion.period, path.stands & (moved != 0.0))
+    return replace(log, motion=replace(motion, slip=slip))
+
+
+def _held_over(axis: AxisModel, motion: Motion, way: float) -> float:
+    """Force (N) by which laws with memory change over so much of a way (m) from the start."""
+    own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
+    moved = np.array([0.0, way, 0.0])
+    place = np.full(len(moved), motion.position[0])
+    now, _, then = force_along(own, place, moved / motion.period, motion.period, *Kind)
+    return float(abs(then - now))
+
+
 def unbalanced(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     """Averaged command + effects - mass x acceleration, (n,) N, log after log."""
     inertia = np.concatenate([log.command - axis.mass * log.acceleration for log in logs])
-    return np.asarray(inertia + averaged_force(axis, logs))
+    return np.asarray(inertia + averaged_force(axis, settled(axis, logs)))
 
 
 def residual(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -221,6 +273,7 @@ def changes(
     Those of one effect go along the motion in one walk; a parameter may be given several times.
     kept: which test functions are asked for, of which the parameters then lie side by side.
     """
+    logs = settled(axis, logs)
     asked = np.ones(sum(map(len, logs)), dtype=bool) if kept is None else kept
     own = split_by_log(asked, logs)
     ends = np.cumsum([np.count_nonzero(some) for some in own])
@@ -234,6 +287,7 @@ def changes(
     spread(walk, product(_walks(axis, where, steps), zip(logs, own, spans, strict=True)))
     if _borne(axis):
         out += _by_load(axis, logs, where, steps)[:, asked]
+    out *= np.concatenate([log.told for log in logs])[asked]
     gain = motor_gain(axis, logs)
     driving = [j for j, c in enumerate(where) if _drives(axis, c)]
     left = unbalanced(axis, logs)[asked] if driving else 0.0

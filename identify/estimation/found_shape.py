@@ -177,6 +177,13 @@ def held_exponents(law: Fitted) -> tuple[str, ...]:
     return tuple(name for name in names if name in law.fixed)
 
 
+def held_strengths(law: Fitted) -> tuple[str, ...]:
+    """Names of the strengths that a MuJoCo file can state, and that a model holds at a value."""
+    if law.effect.of_joint is None:
+        return ()
+    return tuple(p.name for p in law.effect.strengths if p.name in law.fixed and law.values[p.name])
+
+
 def exponent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
     """The steady force of a law of a final fit with its 90 % band, and that of it as it was held.
 

@@ -10,6 +10,8 @@ from identify.dataset.preparation import is_told, require_told, telling
 from identify.dataset.prepared_log import sticks
 from twin.effect import Effect
 from twin.effects import Catalogue
+from twin.errors import InputError
+from twin.logs import LINEAR_UNITS
 from twin.model.machine import AxisModel, Fitted, Hindrance, MachineModel
 from twin.model.parameters import free_parameters
 
@@ -50,6 +52,13 @@ def require_shown(effect: Effect, axes: Mapping[str, tuple[AxisModel, Dataset]])
 
     Raises InputError where there is none.
     """
+    for name, (_, dataset) in axes.items():
+        if not is_logged(effect, dataset):
+            field = effect.channels[0]
+            raise InputError(
+                f"axis {name}: {effect.name} reads the {field}, which not all logs hold; import "
+                f"it, as {field} ({LINEAR_UNITS[field]}) of the axis"
+            )
     own = {n: axis.with_effect(Fitted.at_start(effect)) for n, (axis, _) in axes.items()}
     asked = {n: (axes[n][1], sticks(axis), fitted_count(axis)) for n, axis in own.items()}
     if not (shown := [n for n, each in asked.items() if is_told(*each)]):
@@ -59,9 +68,18 @@ def require_shown(effect: Effect, axes: Mapping[str, tuple[AxisModel, Dataset]])
 
 def _shows(axis: AxisModel, dataset: Dataset, effect: Effect) -> bool:
     """Whether the logs tell more numbers of the axis with the effect than it has without."""
+    if not is_logged(effect, dataset):
+        return False
     if not effect.sticks or sticks(axis):
         return True
     return is_told(dataset, True, fitted_count(axis))
+
+
+def is_logged(effect: Effect, dataset: Dataset) -> bool:
+    """Whether all logs hold what the law reads beside the motion, of several the first."""
+    return all(
+        field in log.motion.channels for field in effect.channels[:1] for log in dataset.logs
+    )
 
 
 def not_tried(
@@ -77,6 +95,10 @@ def not_tried(
             continue
         if (why := model.hindrance(effect, dataset.axis)) is not None:
             found[name] = why
-        elif axis.can_have(effect) and not _shows(axis, dataset, effect):
+        elif (
+            is_logged(effect, dataset)
+            and axis.can_have(effect)
+            and not _shows(axis, dataset, effect)
+        ):
             found[name] = RestsTooOften()
     return found

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
+from identify.estimation.force_balance import settled
 from twin.core.loop import N_SIGNALS, POSITION_COLUMN, Controller, gain_table
 from twin.core.native import Table
 from twin.core.walks import walk
@@ -45,6 +46,7 @@ def as_logged(model: MachineModel, logs: Mapping[str, PreparedLog]) -> MachineMo
 def states_along(
     table: Table,
     position: Array,
+    path: Array,
     command: Array,
     period: float,
     starts: NDArray[np.int64],
@@ -53,7 +55,8 @@ def states_along(
 ) -> Array:
     """Effect states (n_starts, n_states) after following the measured motion up to each start.
 
-    accelerated: whether a law reads the acceleration of the other axis.
+    position, command (n, n_axes): as measured, m and N. path (n, n_axes): m/s, the velocity that
+    the laws follow. accelerated: whether a law reads the acceleration of the other axis.
     """
     pair = len(table.axes) == 2  # no law of a larger machine reads the other axis
     smooth = None
@@ -69,7 +72,7 @@ def states_along(
         acceleration = np.zeros_like(velocity) if smooth is None else smooth[:, span]
         rows = np.empty((len(table.entries), start - begin))
         for a, (first, last, at, _, _) in enumerate(table.axes):
-            motion = np.stack([middle[a], velocity[a], command[span, a]])
+            motion = np.stack([middle[a], path[span, a], command[span, a]])
             others = np.zeros_like(motion)
             if pair:
                 b = 1 - a
@@ -81,6 +84,18 @@ def states_along(
         out[i] = states
         begin = start
     return out
+
+
+def path_at_samples(axis: AxisModel, log: PreparedLog) -> Array:
+    """Velocity (n,) m/s that an axis' laws follow, at the log's own rate."""
+    (log,) = settled(axis, [log])
+    motion = log.motion
+    if motion.path is None or not any(f.effect.remembers for f in axis.effects):
+        return motion.raw[0]
+    path = motion.path.at_samples
+    return (
+        path if motion.slip is None else path + np.repeat(motion.slip.velocity, motion.path.samples)
+    )
 
 
 def _smooth_acceleration(velocity: Array, period: float) -> Array:
@@ -152,7 +167,10 @@ def measured_beginning(axis: AxisModel, log: PreparedLog) -> tuple[Beginning, Ar
     surely = reading * np.linalg.norm(np.array(unit, dtype=float), axis=0)
     # along a log, at which the usual size of a state is seen
     places = np.linspace(side, len(position) - 1, 50).astype(np.int64)
-    along = states_along(table, position[:, None], run.command[:, None], period, places, 0.0, False)
+    path = path_at_samples(axis, log)[:, None]
+    along = states_along(
+        table, position[:, None], path, run.command[:, None], period, places, 0.0, False
+    )
     usual = np.sqrt(np.mean(along**2, axis=0)) * _of_friction(axis, table)
     return Beginning(side, float(x), float(v), along[0]), np.concatenate([surely, usual])
 

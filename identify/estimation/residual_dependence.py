@@ -21,6 +21,8 @@ from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
 from identify.rules import RULE
+from twin.effect import CHANNELS
+from twin.logs import LINEAR_UNITS
 from twin.model.units import LINEAR, AxisUnits
 from twin.signals import Array
 
@@ -53,6 +55,7 @@ UNITS = {
     "other_axis_position": "m",
     "other_axis_velocity": "m/s",
     "other_axis_acceleration": "m/s^2",
+    **{field: LINEAR_UNITS[field] for field in CHANNELS.values()},
 }
 
 

@@ -42,8 +42,8 @@ def export_text(made: Exported) -> str:
     lines = []
     for axis, kept in made.kept.items():
         lines.append(f"axis {axis}: keeps {', '.join(kept) or 'nothing'}")
-        told = (("nearly", made.approximated), ("lost", made.lost), ("gone", made.taken_out))
-        for word, remarks in told:
+        kinds = {"nearly": made.approximated, "lost": made.lost, "in the file": made.written}
+        for word, remarks in kinds.items():
             lines += [f"  {word}: {r.part}, {r.text}" for r in remarks if r.axis == axis]
     return "\n".join(lines)
 

@@ -53,7 +53,8 @@ from identify.output.words.next_step import (
     supposed_in_words,
     wrong_body_in_words,
 )
-from identify.results import figure_of, html_of, text_of
+from identify.output.words.recording import read_otherwise_in_words
+from identify.results import figure_of, html_of, report_of, text_of
 from identify.results.results import (
     Addition,
     AllAdded,
@@ -74,6 +75,8 @@ from twin.experiments.file import in_short
 from twin.model.machine import HistoryStep
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are printed
@@ -156,6 +159,8 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     """
     lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
+    if result.recording:
+        lines = [*read_otherwise_in_words(result.recording), *lines]
     for axis, d in result.axes.items():
         said, units, tested = said_of(result, axis), d.base.axis.units, d.tested
         named = f" Missing: {named_in_words(d)}." if d.named else ""
@@ -279,10 +284,12 @@ def _errors_of(step: HistoryStep, words: Callable[[str], str]) -> Iterator[str]:
 @text_of.register
 def corrected_text(result: CorrectedBody) -> str:
     """What was written into the MuJoCo file, and the errors before and after."""
-    body, file, given = result.body, result.model.mjcf_name, result.given.mjcf_name
-    why = wrong_body_in_words(body, result.given)
-    first = f"Body {body.body} of {file} has {result.element}; {given} is as it was."
-    return "\n".join([first, *(f"  {line}" for line in why)])
+    file, given, lines = result.model.mjcf_name, result.given.mjcf_name, list[str]()
+    for body in result.bodies:
+        why = wrong_body_in_words(body, result.given)
+        lines.append(f"Body {body.body} of {file} has {body.written}; {given} is as it was.")
+        lines += [f"  {line}" for line in why]
+    return "\n".join(lines)
 
 
 @text_of.register
@@ -324,6 +331,14 @@ def _tables(result: FitResult | Comparison | Diagnosis) -> str:
     from identify.output.report import tables
 
     return tables(result)
+
+
+@report_of.register(Comparison | Diagnosis)
+def _page(result: Comparison | Diagnosis, path: Path) -> None:
+    from identify.output.report import write_report
+    from identify.output.report.subject import Subject
+
+    write_report(path, Subject.of(result))
 
 
 @figure_of.register(Comparison | Diagnosis)

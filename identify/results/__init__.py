@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import singledispatch
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,6 +29,12 @@ def html_of(result: object) -> str | None:
 def figure_of(result: object, coordinate: str | None, axis: str | None) -> Figure:
     """The residual of an axis over a coordinate; the leading ones where None."""
     raise TypeError(f"a {type(result).__name__} has no residual")
+
+
+@singledispatch
+def report_of(result: object, path: Path) -> None:
+    """Write a result as a page."""
+    raise TypeError(f"a {type(result).__name__} has no page")
 
 
 class Printed:
@@ -66,6 +73,13 @@ class Pictured(Printed):
     def plot(self, axis: str | None = None) -> Figure:
         """The residual over the coordinate that the answer is about."""
         return figure_of(self, None, axis)
+
+    def report(self, path: Path | str) -> None:
+        """Write the page that ``twin compare`` and ``twin diagnose`` write with -o: one HTML file.
+
+        It appears whole or not at all. Raises InputError where its folder does not exist.
+        """
+        report_of(self, Path(path))
 
     @property
     def residual(self) -> Residual:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from identify.analysis.recording import Recording
 from identify.dataset.dataset import Dataset, Role, by_log
 from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
@@ -17,7 +18,7 @@ from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.offered import NotTried
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
-from identify.links import WrongBody, corrected
+from identify.mechanism.bodies import WrongBody, corrected
 from identify.results import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
 from identify.selection.acceptance import left_on
@@ -34,7 +35,6 @@ from twin.feedforward import followed
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 from twin.model.units import AxisUnits
-from twin.mujoco.written import inertial
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,8 +198,9 @@ class Diagnosis(Pictured):
     refits: what fitting changed of the given model, by axis. not_tried: by axis, effects of the
     catalogue that it lacks and that could not be tried on it, and why. not_planned: for an
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
-    with a remainder, where that is largest. body: of a mechanism, one whose inertia is not that of
-    its file; the diagnoses are those with it as it was found.
+    with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not
+    that of its file, the one that explains most first; the diagnoses are with them as found.
+    recording: how the logs of a mechanism are another than its file needs; all is of them so read.
     """
 
     fitted: MachineModel
@@ -211,17 +212,24 @@ class Diagnosis(Pictured):
     not_tried: Mapping[str, Mapping[str, NotTried]] = field(default_factory=dict)
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
-    body: WrongBody | None = None
+    bodies: tuple[WrongBody, ...] = ()
+    recording: Recording | None = None
+
+    @property
+    def body(self) -> WrongBody | None:
+        """That of the bodies which explains most."""
+        return next(iter(self.bodies), None)
 
     @cached_property
     def model(self) -> MachineModel:
         """The model with everything that was found, fitted together, and how its errors fell."""
-        model, body = self.fitted, self.body
-        if body is not None and body.element is not None and model.joints:
-            model = corrected(model, body, inertial(*body.element), f"{model.name}_corrected.xml")
+        model, bodies = self.fitted, self.bodies
+        if bodies and model.joints:
+            fits = {axis: found.base for axis, found in self.axes.items()}
+            model = corrected(model, bodies, fits, f"{model.name}_corrected.xml")
         for axis, found in self.axes.items():
             if found.findings:
-                mass = found.final.axis.mass if body is None else model.axes[axis].mass
+                mass = model.axes[axis].mass if bodies else found.final.axis.mass
                 model = model.with_axis(axis, replace(found.final.axis, mass=mass))
                 after = self.summaries[axis].after
                 model = model.with_intervals(axis, intervals_to_keep(found.final, after))
@@ -334,17 +342,26 @@ class AllAdded(Printed):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CorrectedBody(Printed):
-    """A model whose MuJoCo file has the inertia of a body as the logs show it.
+    """A model whose MuJoCo file has the inertia of bodies as the logs show it.
 
-    given: the model before, fitted. body: what the logs show of it, with the errors of each joint.
-    element: what was written. kept: as the logs prove it; else nothing is written.
+    given: the model before, fitted. bodies: what the logs show of them, the one that explains most
+    first, with the errors of each joint. kept: as the logs prove them; else nothing is written.
     """
 
     model: MachineModel
     given: MachineModel
-    body: WrongBody
-    element: str
+    bodies: tuple[WrongBody, ...]
     kept: bool = True
+
+    @property
+    def body(self) -> WrongBody:
+        """That which explains most."""
+        return self.bodies[0]
+
+    @property
+    def element(self) -> str:
+        """What was written into it."""
+        return self.body.written
 
 
 def addition(

@@ -152,9 +152,16 @@ class Judged:
 
     @cached_property
     def other_floor(self) -> float:
-        """Noise floor of the logs that were not fitted, N RMS."""
+        """Noise floor of the logs that were not fitted, N RMS.
+
+        At most the force that was logged, which a model of nothing leaves: the noise of a motion
+        grows with the inertia, and a wrong inertia would have it explain what the model lacks.
+        """
         holdout = self.dataset.selection
-        return floor_of(self.fit.axis, holdout) if holdout else self.fit.floor
+        if not holdout:
+            return self.fit.floor
+        logged = rms(np.concatenate([log.command for log in holdout])[np.isfinite(self.other)])
+        return min(floor_of(self.fit.axis, holdout), logged or np.inf)
 
     @cached_property
     def parameters(self) -> float:

@@ -19,7 +19,7 @@ from identify.dataset.prepared_log import Columns, PreparedLog, moving, split_by
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, at_bounds, fit_axis, fit_roughly
 from identify.estimation.force_balance import jacobian, residual
-from identify.estimation.found_shape import held_exponents
+from identify.estimation.found_shape import held_exponents, held_strengths
 from identify.estimation.free_curves import Shape, columns_of, shapes_of, sticking
 from identify.estimation.variable_projection import Start, starts
 from identify.rules import RULE
@@ -135,7 +135,10 @@ class Added:
 
 @dataclass(frozen=True)
 class Freed:
-    """A parameter that a law holds by design, such as an exponent, and that bends its curve."""
+    """A parameter that a law holds by design, such as an exponent, and that bends its curve.
+
+    Or the strength of one that a MuJoCo file states, and that the model holds at its value.
+    """
 
     effect: Effect
     parameter: str
@@ -144,6 +147,11 @@ class Freed:
     @property
     def name(self) -> str:
         return self.effect.name
+
+    @property
+    def is_strength(self) -> bool:
+        """Whether it is how strong the law is, and not what bends it."""
+        return self.effect.parameter(self.parameter).strength
 
     def free(self, axis: AxisModel) -> AxisModel:
         """The axis with the parameter free, at the value that it had."""
@@ -217,11 +225,11 @@ class Reshaped:
 
 
 def freed_of(axis: AxisModel) -> list[Freed]:
-    """The parameters that bend the laws of an axis and are held."""
+    """The parameters that bend the laws of an axis, or that its file states, and are held."""
     return [
         Freed(law.effect, name, law.values[name])
         for law in axis.effects
-        for name in held_exponents(law)
+        for name in (*held_exponents(law), *held_strengths(law))
     ]
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.fit import Errors, Fit, finished
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.rules import RULE
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, control
-from identify.selection.doubts import concluded
+from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
+from identify.selection.lengths import at_another_length
+from identify.selection.odd_logs import without_odd_log
 from identify.selection.search import Found, Step
 from twin.effects import Catalogue
 from twin.parallel import Progress, silent
@@ -112,19 +115,31 @@ class AxisDiagnosis:
 
 
 def diagnose_axis(
-    base: Fit, dataset: Dataset, catalogue: Catalogue, progress: Progress = silent
+    base: Fit,
+    dataset: Dataset,
+    catalogue: Catalogue,
+    progress: Progress = silent,
+    lengths: Sequence[float] = TEST_FUNCTIONS,
 ) -> AxisDiagnosis:
-    """Find what one fitted axis lacks, and what each finding explains."""
+    """Find what one fitted axis lacks, and what each finding explains.
+
+    lengths: s, of test functions with which it is asked again.
+    """
     if any(log.force_noise for log in dataset.training):  # an effect may explain it yet
         dataset = dataset.with_force_noise(0.0)
         base = finished(base.axis, base.begun, dataset.training, base.outcome)
-    ended = concluded(base, dataset, catalogue, progress)
+
+    def conclude(fit: Fit, some: Dataset) -> Conclusion:
+        ended = concluded(fit, some, catalogue, progress)
+        return at_another_length(ended, lengths, catalogue, progress)
+
+    ended, odd = without_odd_log(base, dataset, conclude)
     found, findings = ended.found, ended.findings
     final = found.final
     # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
-        dataset=found.dataset,
+        dataset=replace(found.dataset, odd=odd),
         base=found.base.fit,
         ranking=found.ranking,
         steps=found.passed,

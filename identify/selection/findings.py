@@ -79,12 +79,14 @@ class FindingKind(Enum):
     """What is wrong with the model.
 
     It lacks an effect; a law of it has another shape than the machine's force; it lacks an effect
-    that the nearest one of the catalogue resembles, with another shape of its law.
+    that the nearest one of the catalogue resembles, with another shape of its law; an effect of it
+    has another strength than the file of the machine states.
     """
 
     MISSING = "missing"
     WRONG_SHAPE = "wrong_shape"
     RESEMBLES = "resembles"
+    WRONG_VALUE = "wrong_value"
 
 
 class Confirmation(Enum):
@@ -270,6 +272,8 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
             change.parameter, change.held, final.axis[name].values[change.parameter],
             change.effect.parameter(change.parameter).unit,
         )  # fmt: skip
+        if change.is_strength:
+            return replace(finding, kind=FindingKind.WRONG_VALUE, bend=bend)
         if finding.kind is FindingKind.MISSING and not bend.differs:
             return finding
         drawn = exponent_curve(without[name], final, dataset)

@@ -79,21 +79,23 @@ def tried_beside(
     known, barred = {*trial.taken, *judged.fit.begun.names, *trial.barred}, trial.barred
     effects = [e for e in absent_effects(judged.fit.axis, trial.catalogue) if e.name not in known]
     plain = [Added(e) for e in effects if not e.is_noise]
-    freed = [c for c in freed_of(judged.fit.axis) if c.name not in barred]
+    held = (c for c in freed_of(judged.fit.axis) if c.name not in barred)
+    freed = [c for c in held if not c.is_strength or c.name in trial.catalogue]
     changes: list[Change] = [*plain, *freed]
     if judged.at_floor:
         changes = []
     controls = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")
     screenings = spread(lambda c: c.screen(judged, controls), changes, trying)
-    tried = _refitted(judged, screenings, len({e.kind for e in effects}), progress)
+    looks = judged.dataset.looks
+    tried = _refitted(judged, screenings, looks * len({e.kind for e in effects}), progress)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         progress("trying free curves", 0, 1)
         shapes = [c for c in reshaped_of(judged.fit, judged.dataset) if c.name not in barred]
         curves = [c.screen(judged, controls) for c in shapes]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, len(curves), progress, tried)
+        tried += _refitted(judged, best, looks * len(curves), progress, tried)
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
     trim_memory()

@@ -17,7 +17,13 @@ import numpy as np
 from identify.dataset.dataset import Dataset, by_log
 from identify.dataset.noise import noise_of
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.open_loop import START_FIT, as_logged, open_loop, states_along
+from identify.estimation.open_loop import (
+    START_FIT,
+    as_logged,
+    open_loop,
+    path_at_samples,
+    states_along,
+)
 from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY
 from twin.errors import CannotRun
 from twin.model.machine import MachineModel
@@ -69,7 +75,8 @@ def free_run(
     origins = (log.motion.time_origin for log in logs.values())  # one for all axes of the log
     origin = next(filter(None, origins), 0.0)
     accelerated = any(f.effect.reads("A_OTHER") for a in model.axes.values() for f in a.effects)
-    states = states_along(table, position, command, period, starts, origin, accelerated)
+    path = _path(model, logs, n)
+    states = states_along(table, position, path, command, period, starts, origin, accelerated)
     around = position[np.arange(-side, side + 1)[:, None] + starts]
     ends = [*starts[1:], n]  # the last runs on where there is no room for another start
     begun = zip(starts, ends, states, *local_cubic(around, period), strict=True)
@@ -114,6 +121,16 @@ def _signals(
             for signal, power in ((position, found.reading), (command, found.force)):
                 signal[:, i] += np.sqrt(0.5 * power / model.period) * noise.standard_normal(n)
     return position, command
+
+
+def _path(model: MachineModel, logs: Mapping[str, PreparedLog], n: int) -> Array:
+    """Velocities (n, n_axes) m/s that laws follow up to a start, at the log's own rate."""
+    out = np.zeros((n, len(model.axes)))
+    for i, axis in enumerate(model.axes):
+        if axis in logs:
+            skip = _begun(logs) - logs[axis].motion.left_out
+            out[:, i] = path_at_samples(model.axes[axis], logs[axis])[skip : skip + n]
+    return out
 
 
 def _begun(logs: Mapping[str, PreparedLog]) -> int:

@@ -39,6 +39,7 @@ def test_a_pass_computes_what_a_walk_computes():
     walk_sets(
         table.entries, first, last, table.parameters[None], table.n_states,
         np.stack([position, velocity, velocity]), np.zeros((3, len(t))), 1e-3, 0, totals, 1.0, 0.0,
+        table.remembers, velocity,
     )  # fmt: skip
     np.testing.assert_allclose(found, totals[0], rtol=1e-12)
 

@@ -29,10 +29,11 @@ from cli_runs import refusal, twin
 from strict_json import valid
 
 from identify.analysis.first_model import first_model
-from identify.analysis.joint_signs import misassigned
+from identify.analysis.recording import misassigned
 from identify.dataset.preparation import datasets
 from identify.estimation.open_loop import open_loop
-from identify.links import suspects_of
+from identify.mechanism.departures import departures_of
+from identify.mechanism.groups import What
 from identify.output.as_json import answer_of
 from identify.output.text import text_of
 from identify.selection.diagnosis import diagnose_axis
@@ -132,9 +133,10 @@ def test_a_joint_that_follows_an_axis_needs_no_sensor():
 
 
 def test_friction_of_a_tendon_is_found_on_its_axis_and_nowhere_else():
-    """Of a file that is proposed by the motors' names, whose own friction is not taken over."""
+    """Of a file that is proposed by the motors' names, whose own friction is but a beginning."""
     logs = {str(seed): coupled_log(seed) for seed in (1, 2)}
-    model = first_model(logs, "arm", load_catalogue(), ("arm.xml", COUPLED))
+    text = COUPLED.replace(' stiffness="7" armature="2"', "")
+    model = first_model(logs, "arm", load_catalogue(), ("arm.xml", text))
     assert model.joints == MOTORS
     found = fit(model, {"1": logs["1"]}, {"2": logs["2"]})
     for axis, coulomb, viscous in zip(MOTORS, COULOMB, VISCOUS, strict=True):
@@ -175,7 +177,7 @@ def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
     signals = ([log.axes[j].columns[n] for j in JOINTS] for n in ("position", "force"))
     changed = arm_of(*change(*(np.transpose(columns) for columns in signals)))
     told = misassigned(load_model(folder / "arm.toml"), changed)
-    assert told is None if said is None else told is not None and said in told
+    assert told is None if said is None else told is not None and said in told.said
 
 
 def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder):
@@ -390,8 +392,8 @@ def test_a_constant_force_is_no_torque_constant(folder):
     """Of 4 % of the weight, which masses could be: the motor had been named with 98 %."""
     logs = [arm_log(s, lambda q, v: np.add(friction(q, v), [0.0, 0.0, 0.1])) for s in (101, 102)]
     found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
-    told = suspects_of(found.model, found.fits, found.datasets)
-    assert (told.body, told.motor) == (None, None)
+    told = departures_of(found.model, found.fits, found.datasets, FEW)
+    assert not told.moved
 
 
 def loaded(model: mujoco.MjModel) -> None:
@@ -462,7 +464,7 @@ def test_the_bands_of_a_body_hold_the_truth(folder, monkeypatch):
     for seed in range(1000, 1012, 2):
         a, b = (arm_log(k, change=loaded) for k in (seed, seed + 1))
         found = fit(folder / "arm.toml", {"a": a}, {"b": b})
-        body = suspects_of(found.model, found.fits, found.datasets).body
+        (body,) = departures_of(found.model, found.fits, found.datasets, FEW).bodies
         off.append(np.abs(body.change - truth) / body.band)
     assert 0.85 <= np.mean(np.array(off) < 1.0) < 1.0
 
@@ -482,12 +484,12 @@ def test_a_heavier_link_another_torque_constant_and_nothing_are_told_apart(
     for log in logs:
         log.axes["shoulder"].columns["force"] *= gain
     found = fit(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]})
-    told = suspects_of(found.model, found.fits, found.datasets)
-    assert told.motor == motor
-    assert (told.body and told.body.body) == body
-    if told.body:  # a column along its own joint and what turns with it
-        assert told.body.undetermined == ("mass", "first moment y")
-        assert told.body.differing["first moment x"][0] == pytest.approx(0.12, rel=0.01)
+    told = departures_of(found.model, found.fits, found.datasets, FEW)
+    assert [m.group.axis for m in told.moved if m.group.what is What.GAIN] == [motor] * bool(motor)
+    assert [b.body for b in told.bodies] == [body] * bool(body)
+    for own in told.bodies:  # a column along its own joint and what turns with it
+        assert {"mass", "first moment y"} <= {*own.undetermined}
+        assert own.differing["first moment x"][0] == pytest.approx(0.12, rel=0.01)
     if motor:
         known = Catalogue([*FEW.values(), load_catalogue()["torque_constant"]])
         offered = told.offered(known, motor)

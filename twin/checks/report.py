@@ -41,6 +41,7 @@ class Fault(Enum):
     COARSE_POSITION = "the position is too coarse"
     WEAK_EXCITATION = "the motion excites too little"
     COPY = "the log is a copy of another"
+    ODD = "the log disagrees with the others"
 
 
 @dataclass(frozen=True)

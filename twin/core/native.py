@@ -252,6 +252,8 @@ class Table:
     """How many states there are."""
     labels: tuple[tuple[str, str], ...]
     """(axis name, effect name) of each entry."""
+    remembers: NDArray[np.bool_]
+    """(n,) which laws remember the path."""
     reads_joints: bool = False
     """Whether a law reads the load or the velocities of a mechanism's joints."""
 
@@ -264,6 +266,7 @@ def build_table(
     spans: list[tuple[int, int, int, int, int]] = []
     parameters: list[float] = []
     labels: list[tuple[str, str]] = []
+    remembers: list[bool] = []
     n_states = 0
     for axis, effects in axes.items():
         state_at = n_states
@@ -273,6 +276,7 @@ def build_table(
         for effect, values in sorted(effects, key=lambda e: e[0].turn):
             rows.append((law_address(effect), effect.kind.value, len(parameters), n_states))
             labels.append((axis, effect.name))
+            remembers.append(effect.remembers)
             parameters.extend(values)
             n_states += len(effect.states)
             sensing += effect.kind is Kind.SENSING
@@ -284,6 +288,7 @@ def build_table(
         masses=np.array(masses, dtype=float),
         n_states=n_states,
         labels=tuple(labels),
+        remembers=np.array(remembers, dtype=bool),
         reads_joints=any(
             effect.reads("LOAD") or effect.reads("SPEEDS")
             for effects in axes.values()

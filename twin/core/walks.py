@@ -26,6 +26,7 @@ from twin.effect import (
     MASS,
     MOVED,
     OUT,
+    PRESSURE,
     READING,
     SPEEDS,
     STATIC,
@@ -45,6 +46,7 @@ Array = NDArray[np.float64]
 Entries = NDArray[np.int64]
 
 LOAD_ROW = 3  # of a joint's motion; the velocities of all joints follow
+CHANNEL_ROW = 3  # of what is beside a motion; what else was logged, by the slots of io
 
 _FORCE = Kind.FORCE.value
 _FRICTION = Kind.FRICTION.value
@@ -60,31 +62,36 @@ def walk(
 
     motion (3, n): position m, velocity m/s, command N; of a joint also its load N and the
     velocities of all joints (4 + n_axes, n). others (3, n): position, velocity, acceleration of
-    the other axis; mass: moved mass, kg; time_origin: s, when sample 0 was.
+    the other axis, and channels that were logged (6, n); mass: moved mass, kg; time_origin: s, when
+    sample 0 was.
     The mass that friction acts on is infinite, so that friction slides wherever v != 0: the force
     that holds a measured axis at rest is not determined.
     rows (n_entries, n): N.
     """
     _walk(
-        entries, first, _structure(entries, first, last), last, parameters, states, at, motion,
-        others, dt, begin, rows, time_origin, _lent(dt, mass), np.zeros((2, len(entries))),
+        entries, first, structure_of(entries, first, last), last, parameters, states, at, motion,
+        others, dt, begin, rows, time_origin, lent_io(dt, mass), np.zeros((2, len(entries))),
     )  # fmt: skip
 
 
 def walk_sets(
     entries: Entries, first: int, last: int, sets: Array, states_needed: int, motion: Array,
     others: Array, dt: float, begin: int, totals: Array, mass: float, time_origin: float,
+    remembers: NDArray[np.bool_], path: Array,
 ) -> None:  # fmt: skip
     """Force of all effects together along a measured motion, for several sets of parameters.
 
     As ``walk``, from fresh states, less the force of each effect by itself, which costs a third of
-    a walk. sets (m, n_p); totals (m, n): N.
+    a walk. sets (m, n_p); totals (m, n): N. path (n,): velocity m/s that those laws follow which
+    remember it, by remembers (n_entries,); all others follow that of the motion.
     """
-    structure = _structure(entries, first, last)
+    structure = structure_of(entries, first, last)
     laws = np.ascontiguousarray(entries[first:structure].T)
+    follow = remembers[first:structure]
     _walk_sets(
         entries, laws, structure, last, sets, np.zeros((len(sets), states_needed)), motion, others,
-        dt, begin, totals, time_origin, _lent(dt, mass), np.zeros((2, len(entries))),
+        dt, begin, totals, time_origin, lent_io(dt, mass), np.zeros((2, len(entries))), follow,
+        path,
     )  # fmt: skip
 
 
@@ -93,15 +100,15 @@ def walk_sensing(
     dt: float, readings: Array,
 ) -> None:  # fmt: skip
     """Encoder readings (n,) m along a motion (2 or more, n): position m, velocity m/s."""
-    _walk_sensing(entries, first, last, parameters, states, motion, dt, readings, _lent(dt, 0.0))
+    _walk_sensing(entries, first, last, parameters, states, motion, dt, readings, lent_io(dt, 0.0))
 
 
-def _structure(entries: Entries, first: int, last: int) -> int:
+def structure_of(entries: Entries, first: int, last: int) -> int:
     """The first entry of those of structure effects, which are the last."""
     return int(last) - int(np.count_nonzero(entries[first:last, KIND] == _STRUCTURE))
 
 
-def _lent(dt: float, mass: float) -> Array:
+def lent_io(dt: float, mass: float) -> Array:
     """io (IO_SIZE,) with what no sample changes."""
     io = np.zeros(IO_SIZE)
     io[[DT, WHEN, MASS, MOVED]] = dt, 0.5, 1e300, mass
@@ -109,7 +116,7 @@ def _lent(dt: float, mass: float) -> Array:
 
 
 @compiled(inline=True)
-def _arrive(io, motion, others, k, begin, dt, time_origin):
+def arrive(io, motion, others, k, begin, dt, time_origin):
     """What sample k of a motion brings into io."""
     io[INDEX] = begin + k
     io[TIME] = time_origin + (begin + k) * dt
@@ -119,6 +126,8 @@ def _arrive(io, motion, others, k, begin, dt, time_origin):
     io[X_OTHER] = others[0, k]
     io[V_OTHER] = others[1, k]
     io[A_OTHER] = others[2, k]
+    for j in range(others.shape[0] - CHANNEL_ROW):
+        io[PRESSURE + j] = others[CHANNEL_ROW + j, k]
     if motion.shape[0] > LOAD_ROW:
         io[LOAD] = motion[LOAD_ROW, k]
         for j in range(motion.shape[0] - LOAD_ROW - 1):
@@ -134,7 +143,7 @@ def _walk(
     p, s = parameters.ctypes.data, states.ctypes.data
     standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
     for k in range(motion.shape[1]):
-        _arrive(io, motion, others, k, begin, dt, time_origin)
+        arrive(io, motion, others, k, begin, dt, time_origin)
         lent = borrow(row)
         axis_force(entries, first, structure, parameters, states, at, borrow(io), lent, 0)
         if structure < last:
@@ -146,7 +155,7 @@ def _walk(
 @compiled(nogil=True)
 def _walk_sets(
     entries, laws, structure, last, sets, states, motion, others, dt, begin, totals, time_origin,
-    io, row,
+    io, row, remembers, path,
 ):  # fmt: skip
     addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], laws[P_AT], laws[S_AT]
     w = io.ctypes.data
@@ -156,7 +165,7 @@ def _walk_sets(
         own, friction = totals[j], 0.0
         standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
         for k in range(motion.shape[1]):
-            _arrive(io, motion, others, k, begin, dt, time_origin)
+            arrive(io, motion, others, k, begin, dt, time_origin)
             io[DRY] = 1.0
             io[STATIC] = 1.0
             io[VISCOUS] = 1.0
@@ -166,6 +175,7 @@ def _walk_sets(
             for i in range(laws.shape[1]):
                 io[HOLD] = stop + io[U] + total
                 io[OUT] = 0.0
+                io[V] = path[k] if remembers[i] else motion[1, k]
                 call_at(addresses[i], (p + 8 * p_at[i], s + 8 * s_at[i], w))
                 if kinds[i] == _FORCE:
                     total += io[OUT]
@@ -174,6 +184,7 @@ def _walk_sets(
             own[k] = total - friction + (io[U] - motion[2, k])
             if structure < last:
                 lent = borrow(row)
+                io[V] = motion[1, k]
                 along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
                 for i in range(structure, last):
                     own[k] += row[0, i]

@@ -6,15 +6,13 @@ A file defines ``EFFECT``, a twin.effect.Effect, and takes its name from the fil
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import itertools
 import pkgutil
 import re
-import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from twin.effect import Effect
+from twin.effect import Effect, load_effect
 from twin.entries import near
 from twin.errors import InputError
 
@@ -86,7 +84,7 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
             isolated(_load_and_try, path, seconds=LONGEST_TRIAL, memory=LARGEST_TRIAL)
         except NoAnswer as error:
             raise InputError(f"{path}: {error}") from error
-        effects.append(_load(path))
+        effects.append(load_effect(path))
     return Catalogue(effects)
 
 
@@ -109,28 +107,4 @@ def _load_and_try(path: Path) -> None:
         require_sound,  # only a user's file needs the compiler to be read
     )
 
-    require_sound(_load(path), path)
-
-
-def _load(path: Path) -> Effect:
-    spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{path}: is not a Python file; an effect is one .py file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        if isinstance(error, TypeError) and "Parameter" in reason:
-            reason += (
-                "; a Parameter has a name, unit, start, lower, upper and meaning, in this order"
-            )
-        raise InputError(f"{path}: cannot be loaded as an effect: {reason}") from error
-    effect = getattr(module, "EFFECT", None)
-    if not isinstance(effect, Effect):
-        raise InputError(
-            f"{path}: defines no EFFECT of type twin.effect.Effect; "
-            "see the worked example in examples/my_effect.py"
-        )
-    return effect
+    require_sound(load_effect(path), path)

@@ -43,6 +43,11 @@ EFFECT = Effect(
     sticks=True,
     law=law,
     joint_attributes=dry_and_viscous,
+    of_joint=lambda attributes: {
+        "Fc": attributes["frictionloss"],
+        "Fs": attributes["frictionloss"],
+        "sigma2": attributes["damping"],
+    },
     curves=FRICTION_CURVES,
     fingerprint="force steps at every reversal, and grows in proportion to speed",
     excited_by="constant-speed passes in both directions at several speeds",

@@ -14,6 +14,7 @@ from twin.law_parts import (
     pitches_to_try,
     repeats_after,
     ripple,
+    turns_with_direction,
 )
 
 
@@ -34,7 +35,10 @@ EFFECT = Effect(
         *harmonic_terms(2, "1", 0.5),
     ),
     law=law,
-    knees=(repeats_after("p", Imitated.DRY_FRICTION),),
+    knees=(
+        turns_with_direction(Imitated.OF_POSITION),
+        repeats_after("p", Imitated.DRY_FRICTION),
+    ),
     simplest=of_shortest_pitch,
     several=True,
     fingerprint="residual repeats along the track and flips with the direction of motion",

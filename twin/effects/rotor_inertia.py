@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     law=law,
     joint_attributes=lambda values: {"armature": values["inertia"]},
+    of_joint=lambda attributes: {"inertia": attributes["armature"]},
     added_mass=added_mass,
     of_joints=True,
     fingerprint="residual is proportional to the joint's own acceleration, in every pose",

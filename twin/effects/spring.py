@@ -37,6 +37,7 @@ EFFECT = Effect(
     ),
     law=law,
     joint_attributes=linear_part,
+    of_joint=lambda attributes: {"middle": attributes["springref"], "k1": attributes["stiffness"]},
     curves=(Curve(Coordinate.POSITION),),
     fingerprint="residual is one smooth curve of position, the same in both directions",
     excited_by="slow passes over the whole travel in both directions",

@@ -10,7 +10,7 @@ import math
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from itertools import zip_longest
 from pathlib import Path
@@ -61,15 +61,11 @@ class Loss:
 
 @dataclass(frozen=True)
 class Held:
-    """What a format holds of one axis as the model does, what nearly, and what not at all.
-
-    taken_out: what the user's own file had, and the model has not.
-    """
+    """What a format holds of one axis as the model does, what nearly, and what not at all."""
 
     kept: tuple[str, ...]
     approximated: tuple[Remark, ...]
     lost: tuple[Remark, ...]
-    taken_out: tuple[Remark, ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -78,6 +74,8 @@ class Exported:
 
     files: Mapping[str, str | bytes]
     axes: Mapping[str, Held]
+    written: tuple[Remark, ...] = ()
+    """Of a file that is written back, what of it is another now, and what stays of its own."""
 
     @property
     def kept(self) -> dict[str, tuple[str, ...]]:
@@ -93,11 +91,6 @@ class Exported:
     def lost(self) -> tuple[Remark, ...]:
         """What they do not hold."""
         return tuple(remark for own in self.axes.values() for remark in own.lost)
-
-    @property
-    def taken_out(self) -> tuple[Remark, ...]:
-        """What the user's own file had, and the model has not."""
-        return tuple(remark for own in self.axes.values() for remark in own.taken_out)
 
 
 Export = Callable[["MachineModel", Mapping[str, "Log"]], Exported]

@@ -160,7 +160,9 @@ class ColumnMap(_Column):
         """Values (n,) of the column in SI."""
         factor = self.sign * self.si.size
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large is refused later
-            return np.asarray(factor * float(self.scale) * raw + factor * self.offset)
+            return np.asarray(
+                factor * float(self.scale) * raw + factor * self.offset + self.si.zero
+            )
 
 
 _SIGNAL: Any = Field(None, description='a table such as {column = "name in the file", unit = "mm"}')
@@ -190,6 +192,9 @@ class AxisMap(Entries):
     velocity: ColumnMap | None = _SIGNAL
     current: ColumnMap | None = _SIGNAL
     force: ColumnMap | None = _SIGNAL
+    pressure: ColumnMap | None = _SIGNAL
+    pressure_2: ColumnMap | None = _SIGNAL
+    temperature: ColumnMap | None = _SIGNAL
 
     @property
     def columns(self) -> dict[str, ColumnMap]:
@@ -237,7 +242,10 @@ class AxisMap(Entries):
             )
 
     def _has(self, units: Mapping[str, str]) -> list[str]:
-        return [f for f, c in self.columns.items() if c.si.si == units[f] != "A"]
+        return [
+            f for f, c in self.columns.items()
+            if c.si.si == units[f] and LINEAR_UNITS[f] != ROTARY_UNITS[f]
+        ]  # fmt: skip
 
 
 class _File(Entries):

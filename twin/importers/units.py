@@ -52,8 +52,11 @@ _QUANTITIES: Mapping[str, Mapping[str, float]] = {
     "rad/s^2": _per(_ANGLE, 2),
     "A": _prefixed("A"),
     "N": _prefixed("N"),
+    "Pa": {**_prefixed("Pa"), "MPa": 1e6, "hPa": 1e2, "bar": 1e5, "mbar": 1e2, "psi": 6894.757},
+    "K": {"K": 1.0, "degC": 1.0, "°C": 1.0},
     "N m": {**_prefixed("Nm"), "mNmm": 1e-6, "Nmm": 1e-3, "Ncm": 1e-2},
 }
+CELSIUS, ICE = ("degC", "°C"), 273.15  # K, their zero
 # what only a scale turns into a physical quantity
 COUNTS = ("count", "counts", "cts", "cnt", "increment", "increments", "inc", "incs", "digit",
            "digits", "pulses", "ticks", "steps", "LSB")  # fmt: skip
@@ -68,6 +71,8 @@ class Unit:
 
     size: float
     si: str | None
+    zero: float = 0.0
+    """Its zero in SI: of degC."""
 
 
 def find_unit(text: str, *allowed: str) -> Unit:
@@ -77,7 +82,7 @@ def find_unit(text: str, *allowed: str) -> Unit:
         plain = plain[:-1] + "^2"
     for si in allowed:
         if plain in _QUANTITIES[si]:
-            return Unit(_QUANTITIES[si][plain], si)
+            return Unit(_QUANTITIES[si][plain], si, ICE if plain in CELSIUS else 0.0)
     if plain in _RAW:
         return Unit(1.0, None)
     counted, _, time = plain.partition("/")

@@ -19,9 +19,11 @@ from twin.effect import (
     IO_SIZE,
     LOAD,
     MASS,
+    PRESSURE,
     READING,
     SPEEDS,
     STATIC,
+    TEMPERATURE,
     TIME,
     V_OTHER,
     VISCOUS,
@@ -84,9 +86,14 @@ def forces(effects: Sequence[Fitted], motion: TrialMotion) -> dict[str, Array]:
     signals = np.stack([motion.x, motion.v, motion.u, motion.u, motion.v])  # load, another joint
     walk(
         table.entries, first, last, table.parameters, states, state, signals,
-        signals, motion.dt, 0, rows, 1.0, 0.0,
+        np.vstack([signals[:3], channels(len(motion))]), motion.dt, 0, rows, 1.0, 0.0,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
+
+
+def channels(count: int) -> Array:
+    """What is logged beside a motion (3, count): it stays, whatever the axis does."""
+    return np.repeat([[0.7], [-0.4], [0.9]], count, axis=1)
 
 
 def sampled(motion: TrialMotion) -> Array:
@@ -100,6 +107,7 @@ def sampled(motion: TrialMotion) -> Array:
     io[:, HOLD] = motion.v / motion.dt + motion.u
     io[:, READING] = motion.x
     io[:, LOAD], io[:, SPEEDS] = motion.u, motion.v
+    io[:, PRESSURE : TEMPERATURE + 1] = channels(len(motion)).T
     io[:, WHEN] = 1.0
     return io
 

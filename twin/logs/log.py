@@ -22,6 +22,9 @@ LINEAR_UNITS = {
     "velocity": "m/s",
     "current": "A",
     "force": "N",
+    "pressure": "Pa",
+    "pressure_2": "Pa",
+    "temperature": "K",
 }
 FIELDS = tuple(LINEAR_UNITS)
 HELD = ("current", "force")  # held over a sample, so that their mean acts; all others are readings

@@ -367,8 +367,13 @@ class MachineModel:
         return any(axis.is_imposed for axis in self.axes.values())
 
     def require_mass(self) -> None:
-        """Raise CannotRun where the motion of an axis is imposed."""
+        """Raise CannotRun where none can be simulated: one is imposed, or a law reads a log."""
         for name, axis in self.axes.items():
+            for law in (f.effect for f in axis.effects if f.effect.channels):
+                raise CannotRun(
+                    f"axis {name}: {law.name} reads the {law.channels[0]} of a log, which no "
+                    f"simulation has; remove {law.name}"
+                )
             if axis.is_imposed:
                 mass, unit = axis.units.mass_name, axis.units.mass
                 raise CannotRun(

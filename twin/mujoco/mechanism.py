@@ -160,6 +160,11 @@ class Mechanism:
         first, *others = (np.stack(m.along(*motion)) for m in of)
         return np.stack([other - first for other in others], axis=1)
 
+    def by_change(self, axis: int, change: Array, *motion: Array) -> Array:
+        """Momentum and force (2, n_axes, n) along a motion of a change (10,) of a body."""
+        after = self._with(axis, self.inertial(axis) + change)
+        return np.stack(after.along(*motion)) - np.stack(self.along(*motion))
+
     def _with(self, axis: int, inertial: Array) -> Mechanism:
         """With the body of an axis of these parameters (10,)."""
         model, body = copy(self.model), self._body(axis)

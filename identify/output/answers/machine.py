@@ -270,7 +270,8 @@ class ExportAnswer(Answer):
     kept: dict[str, list[str]]
     approximated: list[RemarkEntry]
     lost: list[RemarkEntry]
-    taken_out: list[RemarkEntry]
+    written: list[RemarkEntry]
+    """What of a file that is written back is another now, and what stays beside the model."""
 
 
 class OutdatedEntry(Entry):

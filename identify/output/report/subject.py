@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, all_found, said_of
@@ -33,6 +34,14 @@ class Subject:
     source: Source = UNKNOWN
     machine: OnMachine = UNTOLD
     findings: Sequence[str] = ()
+
+    @classmethod
+    def of(cls, result: Diagnosis | Comparison, source: Source = UNKNOWN, **more: Any) -> Subject:
+        """That of a result under its usual title; more: fields."""
+        told = isinstance(result, Diagnosis)
+        given = result.fitted if isinstance(result, Diagnosis) else result.model
+        title = "what the model lacks" if told else "model against measurement"
+        return cls(f"{given.name}: {title}", result, given.history, source=source, **more)
 
     @property
     def diagnosis(self) -> Diagnosis | None:

@@ -83,6 +83,10 @@ def _explained(finding: Finding) -> str:
         if finding.bend:
             with_it, without = (f"with {value}" for value in _exponents_in_words(finding.bend))
             what = f"{finding.effect} has another shape, which its law {with_it} has: that"
+    if finding.kind is FindingKind.WRONG_VALUE and finding.bend:
+        logs, file = _exponents_in_words(finding.bend)
+        what = f"of {finding.effect} the file says {file}, the logs {logs}: that"
+        with_it, without = "with the value of the logs", "with that of the file"
     how = {
         Confirmation.CONTRADICTED: "is contradicted by the test logs",
         Confirmation.UNTESTED: "is not tested by the test logs, whose error hardly changes",
@@ -282,11 +286,20 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
 
 
 def _proved(found: AxisDiagnosis) -> str:
-    lacks, them = ("several effects", "them") if len(found.named) > 1 else ("an effect", "it")
+    several = len(found.named) > 1
+    lacks, them = ("several effects", "them") if several else ("an effect", "it")
     proof = f"the training logs prove {them}, block by block; there is no selection log"
     if found.dataset.selection:
         proof = f"the training logs and the selection logs prove {them}"
+    if len(_other_values(found)) == len(found.named):
+        values = "Values of the machine's file are" if several else "A value of the file is"
+        return f"{values} not the machine's: {proof}."
     return f"The model lacks {lacks}: {proof}."
+
+
+def _other_values(found: AxisDiagnosis) -> list[str]:
+    """The effects of which the file of the machine states another value than the logs show."""
+    return [f.effect for f in found.findings if f.kind is FindingKind.WRONG_VALUE]
 
 
 def _reshaped(found: AxisDiagnosis) -> list[str]:
@@ -317,7 +330,10 @@ def headline_in_words(found: AxisDiagnosis) -> str:
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
             are = "are" if len(found.named) > 1 else "is"
-            answer = f"{named_in_words(found)} {are} missing"
+            what = "missing"
+            if len(_other_values(found)) == len(found.named):
+                what = "not as the file says"
+            answer = f"{named_in_words(found)} {are} {what}"
             if reshaped := _reshaped(found):
                 answer += f", and {listed(reshaped)} has another shape"
         case Verdict.WRONG_SHAPE:

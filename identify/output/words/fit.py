@@ -32,6 +32,7 @@ from identify.output.numbers import (
     spaced,
     span,
 )
+from identify.output.words.odd import odd_in_words
 from identify.results.results import FitResult, SimulationFit
 from identify.selection.nonparametric import followed
 from identify.validation.agreement import AxisAgreement, Difference
@@ -195,6 +196,8 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             "measured predicts and no sensor makes. Its origin is not known: it counts as noise, "
             "of the drive or of its surroundings"
         )
+    if dataset.odd:
+        said.append(odd_in_words(dataset))
     said += [
         f"{log}: the first {quantity(end, 's')} are left out, as their {words('force')} fits "
         "nothing that follows: the axis did not yet move freely. Cut the log, or begin it in motion"

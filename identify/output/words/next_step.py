@@ -15,7 +15,7 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.links import INERTIAL, LINK_MASS, WrongBody
+from identify.mechanism.bodies import INERTIAL, LINK_MASS, WrongBody
 from identify.output.numbers import DisplayUnit, arrow, listed, number, percent, quantity, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.results.results import Addition, Diagnosis
@@ -24,7 +24,6 @@ from twin.effects import load_catalogue
 from twin.experiments.file import in_short
 from twin.experiments.kinds import kind_of
 from twin.model.machine import HistoryStep, MachineModel
-from twin.mujoco.written import inertial
 
 OPTIONS = {Role.TRAINING: (), Role.SELECTION: ("--holdout",), Role.TEST: ("--test",)}
 WRITE = "twin diagnose MODEL LOG... --model better.toml"  # the model with all that was found
@@ -280,17 +279,20 @@ def also_chose_in_words(on: Role) -> str | None:
 
 
 def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
-    """What is said of the body, and the next command; nothing where there is none."""
-    found = result.body
-    if found is None:
+    """What is said of the bodies, and the next command; nothing where there are none."""
+    if not result.bodies:
         return []
-    said, file = wrong_body_in_words(found, result.fitted), result.fitted.mjcf_name
-    if found.element is None:
-        return [*said, f"Next: change the body in {file}, then fit again."]
+    file, said = result.fitted.mjcf_name, list[str]()
+    for found in result.bodies:
+        said += wrong_body_in_words(found, result.fitted)
     command = f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
     filled = source.filled(command, names_of(next(iter(result.axes.values())).dataset))
-    written = inertial(*found.element)
-    return [*said, f"Next: {filled} writes {written} into the body, in a copy of {file}."]
+    elements = " and ".join(f"{b.written} into {_of(b, result.bodies)}" for b in result.bodies)
+    return [*said, f"Next: {filled} writes {elements}, in a copy of {file}."]
+
+
+def _of(body: WrongBody, among: Sequence[WrongBody]) -> str:
+    return f"body {body.body}" if among[1:] else "the body"
 
 
 def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:

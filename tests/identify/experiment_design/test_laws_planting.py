@@ -151,7 +151,8 @@ def states_of(axis, x, starts, command=None):
     """The table of two such axes, and their states at the starts along positions (n, 2) m."""
     table = MachineModel("s", {"x": axis, "y": axis}).table()
     given = 0.0 * x if command is None else command
-    return table, states_along(table, x, given, 1.0 / RATE, starts, 0.0)
+    path = np.diff(x, axis=0) * RATE
+    return table, states_along(table, x, path, given, 1.0 / RATE, starts, 0.0)
 
 
 def test_states_at_a_restart_are_those_of_the_motion_before_it():

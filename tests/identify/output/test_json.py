@@ -98,10 +98,10 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "diagnosis: no experiment, refused": lambda: lost(
         refits={}, next_experiments={}, not_planned={"x": "no travel"}
     ),
-    "diagnosis: another body": lambda: replace(made.diagnosed(), body=made.wrong_body()),
+    "diagnosis: another body": lambda: replace(made.diagnosed(), bodies=(made.wrong_body(),)),
     "corrected body": lambda: CorrectedBody(
         replace(made.diagnosed().model, mjcf_name="b.xml"), made.diagnosed().model,
-        made.wrong_body(), "<inertial/>",
+        (made.wrong_body(),),
     ),
     **{f"effect {n}": lambda n=n: EffectAnswer.of(CATALOGUE[n]) for n in ("lugre", NOISE.name)},
     "laws": laws,

@@ -167,7 +167,7 @@ SAID_OF: dict[str, Callable[[], Diagnosis]] = {
     "diagnosis: the only effect contradicted": contradicted,
     "diagnosis: unexplained without a period": aperiodic,
     "diagnosis: no experiment": refused,
-    "diagnosis: another body": lambda: replace(made.diagnosed(), body=made.wrong_body()),
+    "diagnosis: another body": lambda: replace(made.diagnosed(), bodies=(made.wrong_body(),)),
 }
 RISING = replace(made.STEPS[0], fit_error_before=0.0341, fit_error_after=0.713)
 FALLING = replace(made.STEPS[2], fit_error_before=0.723, fit_error_after=0.0331)

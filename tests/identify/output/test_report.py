@@ -187,6 +187,16 @@ def test_the_last_band_of_frequency_is_as_wide_as_it_is(case: Case) -> None:
     assert all(line.values[-1] == line.values[-2] for line in chart.lines)
 
 
+def test_a_result_writes_its_page(case: Case, tmp_path: Path) -> None:
+    for kind, result in (("lacks", case.diagnosis), ("against", case.diagnosis.comparison)):
+        result.report(tmp_path / "page.html")
+        written = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert f"<title>{case.model.name}: " in written
+        assert kind in Outline(written).text
+    with pytest.raises(InputError, match="its folder does not exist"):
+        case.diagnosis.report(tmp_path / "none" / "page.html")
+
+
 def test_a_comparison_alone_has_one_residual(case: Case, tmp_path: Path) -> None:
     (axis,) = signals_in(
         case.write(tmp_path / "c.html", result=case.diagnosis.comparison, additions=())

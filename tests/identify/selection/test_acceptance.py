@@ -212,7 +212,7 @@ STICKY = Fitted.at_start(CATALOGUE["lugre"])
 PHYSICAL = [
     e
     for e in CATALOGUE.values()
-    if e.strengths and not (e.is_nonparametric or e.is_noise or e.of_joints)
+    if e.strengths and not (e.is_nonparametric or e.is_noise or e.of_joints or e.channels)
 ]
 FRICTIONS = [e for e in PHYSICAL if e.kind is Kind.FRICTION]
 OTHERS = [e for e in PHYSICAL if e.kind is not Kind.FRICTION]

@@ -60,7 +60,9 @@ def logged(effects: Sequence[Fitted], stage: Stepper) -> Log:
     return simulate(model, "moves", seed=3, duration=0.1, simulator=stage)
 
 
-ALL_BUT_FRICTIONS = tuple(e for e in CATALOGUE.values() if e.kind is not Kind.FRICTION)
+ALL_BUT_FRICTIONS = tuple(
+    e for e in CATALOGUE.values() if e.kind is not Kind.FRICTION and not e.channels
+)
 
 
 @pytest.mark.parametrize("stage", BOTH)

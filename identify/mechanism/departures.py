@@ -1,0 +1,212 @@
+"""What of a mechanism has to move away from its file, before any effect of a single joint is asked.
+
+The bodies that must move are corrected in the datasets of all joints. Of rotors, torque constants,
+friction with load and springs a diagnosis of a joint may name those that must move there, and no
+others: as a joint alone they imitate each other and the bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identify.dataset.dataset import Dataset
+from identify.estimation.fit import Errors, Fit, fit_axis
+from identify.estimation.intervals import half_widths_by
+from identify.mechanism.bodies import Body, WrongBody
+from identify.mechanism.choice import Choice, Moved
+from identify.mechanism.groups import Group, What, groups_of
+from identify.mechanism.regression import Regression, Solution, regression_of
+from identify.rules import RULE
+from identify.selection.acceptance import Judged
+from identify.selection.diagnosis import AxisDiagnosis
+from twin.effects import Catalogue
+from twin.model.machine import MachineModel
+from twin.parallel import Progress, silent
+from twin.signals import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Departures:
+    """What must move, and the joints beside the bodies as they were found.
+
+    asked: whether the joints are those of a mechanism, and more than noise is left of them. names:
+    of the laws by which groups are told.
+    """
+
+    datasets: Mapping[str, Dataset]
+    fits: Mapping[str, Fit]
+    moved: Sequence[Moved] = ()
+    bodies: tuple[WrongBody, ...] = ()
+    asked: bool = False
+    names: Mapping[What, str] = field(default_factory=dict)
+
+    def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
+        """The effects that a diagnosis of that axis may name.
+
+        Friction that follows the load is a matter of one joint, and so is a rotor of which the file
+        says nothing: what the model lacks otherwise on a joint may hide them here.
+        """
+        if not self.asked:
+            return catalogue
+        own = {m.group.what for m in self.moved if m.group.axis == axis} | {What.LOAD}
+        own |= {What.ROTOR} if self.fits[axis].begun.weighed is self.fits[axis].begun else set()
+        others = [what for what in What if what not in own]
+        return Catalogue([e for e in catalogue.values() if not any(w.covers(e) for w in others)])
+
+    def with_ties(self, found: AxisDiagnosis) -> AxisDiagnosis:
+        """The diagnosis of an axis, with what of other joints explains as much as a finding."""
+        own = [m for m in self.moved if m.group.axis == found.dataset.axis]
+        laws = {f.effect.name: f.effect for f in found.final.axis.effects}
+
+        def tied(name: str) -> list[str]:
+            alike = (m.tied for m in own if name in laws and m.group.what.covers(laws[name]))
+            return [self.told(group) for groups in alike for group in groups]
+
+        findings = tuple(
+            replace(f, tied=tuple(dict.fromkeys((*f.tied, *tied(f.effect)))))
+            for f in found.findings
+        )
+        return replace(found, findings=findings)
+
+    def told(self, group: Group) -> str:
+        """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
+        return f"{self.names[group.what]} of {group.place}"
+
+
+def departures_of(
+    model: MachineModel,
+    fits: Mapping[str, Fit],
+    datasets: Mapping[str, Dataset],
+    catalogue: Catalogue,
+    progress: Progress = silent,
+) -> Departures:
+    """What must move away from the file of a mechanism; catalogue: of whose laws it is told.
+
+    fits, datasets: of the axes that move. Of long logs the beginnings tell it. Nothing is asked
+    where only noise is left of every joint.
+    """
+    nothing = Departures(datasets, fits)
+    if not model.joints:
+        return nothing
+    before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
+    if all(judged.at_floor for judged in before.values()):
+        return nothing
+    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
+
+    mechanism = mechanism_in(model)
+    bodies = [Body(mechanism, mechanism.axes.index(axis)) for axis in before]
+    progress("bodies, rotors and motors of all joints", 0, 1)
+    axes = {axis: judged.fit.axis for axis, judged in before.items()}
+    reaches = {axis: _reach(judged.dataset) for axis, judged in before.items()}
+    regression = regression_of(before, groups_of(bodies, axes, reaches))
+    for body in bodies:
+        body.forget()
+    moved = Choice(regression).moved()
+    names = {what: what.named(catalogue) for what in What}
+    return _with_bodies(replace(nothing, moved=moved, asked=True, names=names), regression)
+
+
+def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:
+    part = dataset.part
+    return Judged(fit if part is dataset else _refitted(fit, part), part)
+
+
+def _refitted(fit: Fit, dataset: Dataset) -> Fit:
+    return replace(fit_axis(fit.axis, dataset.training), begun=fit.begun)
+
+
+def _reach(dataset: Dataset) -> tuple[float, float]:
+    ends = [log.extent[1] for log in dataset.training]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def _with_bodies(found: Departures, regression: Regression) -> Departures:
+    """With the bodies that moved corrected in the datasets, and the joints refitted beside them."""
+    own = [m for m in found.moved if m.group.what is What.BODY]
+    if not own:
+        return found
+    told = _Told.of(regression, [m.group for m in found.moved])
+    datasets = dict(found.datasets)
+    for m in own:
+        assert m.group.body is not None
+        change = told.changes[m.group.place]
+        datasets = {a: m.group.body.corrected(d, change) for a, d in datasets.items()}
+    fits = {a: _refitted(found.fits[a], d) for a, d in datasets.items()}
+    errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
+    bodies = tuple(_told_of(found, m, told, errors) for m in own)
+    return replace(found, datasets=datasets, fits=fits, bodies=bodies)
+
+
+def _told_of(
+    found: Departures, moved: Moved, told: _Told, errors: Mapping[str, Errors]
+) -> WrongBody:
+    body, name = moved.group.body, moved.group.place
+    assert body is not None
+    return WrongBody(
+        body=name,
+        axis=body.axis,
+        tied=tuple(g.place if g.body else found.told(g) for g in moved.tied),
+        axes=tuple(axis for axis in body.axes if axis in errors),
+        inertial=body.inertial,
+        change=told.changes[name],
+        band=told.bands[name],
+        score=moved.score,
+        errors=errors,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What a regression tells of bodies, by name: changes (10,), half their 90 % bands (10,)."""
+
+    changes: Mapping[str, Array] = field(default_factory=dict)
+    bands: Mapping[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
+        """Beside all that moved. The bands are by the scatter between stretches of time.
+
+        Of all joints together. Where the logs ask for other torque constants, which no file knows
+        well, what the values are beside these is within the bands.
+        """
+        groups = regression.groups
+        asked = [i for i, g in enumerate(groups) if g in moved]
+        found, beside = regression.feasible(asked), _beside_gains(regression, asked)
+        left, _ = regression.left(found)
+        where = np.concatenate(
+            [np.arange(regression.base.stop), *(_range(regression.spans[i]) for i in asked)]
+        )
+        columns, weights = regression.training.columns[:, where], np.eye(len(where))
+        bands = half_widths_by(columns.copy(), left, weights)
+        changes, told = {}, {}
+        for i in (i for i in asked if groups[i].what is What.BODY):
+            span = regression.spans[i]
+            own, other = found.values[span], (beside or found).values[span]
+            band = np.hypot(bands[np.isin(where, _range(span))], other - own)
+            known = regression.known_by_data(asked, span)
+            changes[groups[i].place], told[groups[i].place] = own, np.where(known, band, np.nan)
+        return cls(changes, told)
+
+
+def _beside_gains(regression: Regression, asked: Sequence[int]) -> Solution | None:
+    """The same beside the torque constants of all joints; None where the logs ask for none."""
+    accuracy = 0.1  # relative: two papers of one machine, by its makers, differ by as much
+    known = np.full(1, accuracy)
+    groups = [replace(g, scale=known) if g.what is What.GAIN else g for g in regression.groups]
+    free = replace(regression, groups=groups)
+    gains = [i for i, g in enumerate(groups) if g.what is What.GAIN and i not in asked]
+    alone, both = (free.feasible(own) for own in (asked, [*asked, *gains]))
+    return both if free.criterion(both) < free.criterion(alone) - RULE.least_bic else None
+
+
+def _range(span: slice) -> Array:
+    return np.arange(span.start, span.stop)
+
+
+def _errors(before: Fit, given: Dataset, after: Fit, found: Dataset) -> Errors:
+    """Of one axis without and with what was found, on the logs that are reported."""
+    first, second = (Errors.of(f, f, d, d.tested_on) for f, d in ((before, given), (after, found)))
+    return replace(first, after=second.after)

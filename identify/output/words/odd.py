@@ -1,0 +1,49 @@
+"""What is said of a log that disagrees with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.odd_log import Disagreement
+from identify.output.numbers import number, quantity
+from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
+from twin.model.units import AxisUnits
+
+
+def odd_in_words(dataset: Dataset) -> str:
+    """Of a dataset with an odd log: which it is, how it disagrees, what was done or is to do."""
+    assert dataset.odd is not None
+    kept = any(log.motion.name == dataset.odd.log for log in dataset.logs)
+    what = "leave it out, or find what was otherwise" if kept else "all else is told without it"
+    return f"{dataset.odd.log} {_disagrees(dataset.odd, dataset.units)}; {what}"
+
+
+def with_odd(
+    reports: Mapping[str, CheckReport], found: Mapping[str, Dataset]
+) -> dict[str, CheckReport]:
+    """Reports on logs, with that one disagrees with the others; found: by axis that has one."""
+    out = dict(reports)
+    for axis, dataset in found.items():
+        if dataset.odd is None:
+            continue
+        own = LogFinding(
+            Severity.WARNING, Fault.ODD, axis, f"it {_disagrees(dataset.odd, dataset.units)}",
+            WHOLE, "leave it out, or find what was otherwise",
+        )  # fmt: skip
+        report = out[dataset.odd.log]
+        out[dataset.odd.log] = CheckReport((*report.findings, own))
+    return out
+
+
+def _disagrees(odd: Disagreement, units: AxisUnits) -> str:
+    """By how much a log disagrees with the others, when, and as if what were otherwise in it."""
+    error, others = (quantity(size, units.force) for size in (odd.error, odd.others))
+    said = f"disagrees with the other logs: {odd.times:.1f} times their error, {error} of {others}"
+    if odd.span:
+        said += ", above all from " + " to ".join(quantity(instant, "s") for instant in odd.span)
+    if odd.otherwise:
+        label, there, elsewhere = odd.otherwise
+        name = units.mass_name if label == "mass" else units.words(label)
+        said += f", as if {name} were {number(there / elsewhere)} times as large in it"
+    return said

@@ -1,0 +1,56 @@
+"""A conclusion without a log that disagrees with the others.
+
+One spoiled log raises the floor of all and hides what the others prove. But what a model lacks may
+look like a log that disagrees, until it is found. So a log that stands out goes, the diagnosis is
+made of the others, and the log is asked again beside what was found: only one that still disagrees
+is named, any other comes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from identify.dataset.dataset import Dataset
+from identify.dataset.odd_log import Disagreement
+from identify.estimation.alignment import realigned
+from identify.estimation.disagreement import disagreeing
+from identify.estimation.fit import Fit, fit_axis
+from identify.selection.doubts import Conclusion
+
+MOST_TURNS = 3  # of leaving out and asking again
+
+
+def without_odd_log(
+    base: Fit, dataset: Dataset, conclude: Callable[[Fit, Dataset], Conclusion]
+) -> tuple[Conclusion, Disagreement | None]:
+    """What the logs come to but one that disagrees with the others, and that one.
+
+    conclude: what a fit of some logs comes to.
+    """
+    odd = disagreeing(base.axis, dataset.logs)
+    for _ in range(MOST_TURNS):
+        ended = conclude(*_others(base, dataset, odd))
+        first, odd = odd, _odd_beside(ended, dataset)
+        if (first and first.log) == (odd and odd.log):
+            return ended, odd
+    return conclude(base, dataset), None  # in turns this log and that: it is no log
+
+
+def _others(base: Fit, dataset: Dataset, odd: Disagreement | None) -> tuple[Fit, Dataset]:
+    """The fit of the logs but an odd one, and these."""
+    if odd is None:
+        return base, dataset
+    rest = dataset.without(odd.log)
+    if [*rest.training] == [*dataset.training]:
+        return base, rest
+    return replace(fit_axis(base.axis, rest.training), begun=base.begun), rest
+
+
+def _odd_beside(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
+    """The log that disagrees with the others beside all that was found."""
+    found = ended.found.dataset
+    there = realigned(dataset, found.channel_delay)
+    if found.test_function_length != dataset.test_function_length:
+        there = there.at_length(found.test_function_length)
+    return disagreeing(ended.found.final.fit.axis, there.logs)

@@ -1,0 +1,92 @@
+"""What of a mechanism must move away from its file is named on its body or joint, and nothing else.
+
+Arms of bare MuJoCo whose files state rotors, damping and dry friction of their joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.second_simulator.arms import Changed, drawn, inertia, log_of
+from identify.analysis.first_model import first_model
+from identify.mechanism.bodies import possible
+from identify.mechanism.departures import departures_of
+from identify.mechanism.groups import What
+from identify.workflow import diagnose, fit
+from twin.effects import Catalogue, load_catalogue
+
+CATALOGUE = load_catalogue()
+FEW = Catalogue([CATALOGUE[n] for n in ("rotor_inertia", "torque_constant", "spring", "gravity")])
+
+
+def arm_of(axes=("0 0 1", "0 1 0", "0 1 0")):
+    """Three hinges, read without steps and recorded at 250 Hz."""
+    arm = drawn(np.random.default_rng(5), len(axes), 250)
+    still = tuple(False for _ in axes)
+    coarse = np.full(len(axes), 1e-5)
+    return replace(arm, axes=axes, slides=still, presliding=False, encoder=coarse)
+
+
+ARM = arm_of()
+OWN = inertia(ARM)
+
+
+def found_of(changed, seed=1):
+    logs = [{f"{i}": log_of(ARM, changed, 10 * seed + i, 8.0)} for i in range(2)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", ARM.text))
+    fitted = fit(model, *logs)
+    return departures_of(fitted.model, fitted.fits, fitted.datasets, FEW)
+
+
+def named(found):
+    return [(m.group.what, m.group.place) for m in found.moved]
+
+
+@pytest.mark.parametrize(
+    ("changed", "right"),
+    [
+        (Changed(), []),
+        (Changed(payload=0.8), [(What.BODY, "link3")]),
+        (Changed(rotor={1: 0.4 * OWN[1]}), [(What.ROTOR, "joint2")]),
+        (Changed(gain={1: 0.12}), [(What.GAIN, "joint2")]),
+        pytest.param(
+            Changed(payload=0.8, gain={1: -0.12}),
+            [(What.BODY, "link3"), (What.GAIN, "joint2")],
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_what_is_changed_must_move_and_nothing_else(changed, right):
+    found = found_of(changed)
+    assert sorted(named(found), key=str) == sorted(right, key=str)
+    if changed.payload:
+        (body,) = found.bodies
+        assert body.change[0] == pytest.approx(0.8, abs=max(body.band[0], 0.04))
+
+
+def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_value():
+    changed = Changed(rotor={1: 0.4 * OWN[1]})
+    logs = [{f"{i}": log_of(ARM, changed, 30 + i, 8.0)} for i in range(2)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", ARM.text))
+    for joint, axis in model.axes.items():
+        stated = float(f"{ARM.armature[ARM.joints.index(joint)]:.4g}")
+        assert axis["rotor_inertia"].values == {"inertia": stated}
+        assert axis["rotor_inertia"].fixed == {"inertia"}
+    found = diagnose(model, *logs, catalogue=FEW)
+    assert [d.named for d in found.axes.values()] == [(), ("rotor_inertia",), ()]
+    assert "of rotor_inertia the file says inertia = " in str(found)
+    given = found.axes["joint2"].findings[0].parameters["inertia"]
+    assert given == pytest.approx(ARM.armature[1] + 0.4 * OWN[1], rel=0.02)
+
+
+def test_a_body_has_the_nearest_parameters_that_it_can_have():
+    ball = np.array([2.0, 0.0, 0.0, 0.0, 0.02, 0.02, 0.02, 0.0, 0.0, 0.0])
+    assert possible(ball, np.eye(10), [ball]) is ball
+    off = ball - np.array([2.5, 0.0, 0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
+    near = possible(off, np.eye(10), [ball])
+    assert 0.0 <= near[0] < 0.1  # a mass below zero is none
+    assert near[4] >= -1e-6
+    assert near[4] + near[5] >= near[6] - 1e-6  # the triangle of moments

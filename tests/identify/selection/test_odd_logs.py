@@ -1,0 +1,87 @@
+"""A log that disagrees with the others is told and left out; a sound one never is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_logs import RATE, SLIDE, Ride, few, having, logged
+
+import identify
+from identify.dataset.dataset import Dataset
+from twin.logs import AxisLog, Log
+from twin.model.machine import AxisModel, MachineModel
+
+RIDES = {f"run{i}": Ride(20 + i) for i in range(4)}
+MODEL = MachineModel("m", {"x": SLIDE}, RATE)
+
+
+def runs(machine: AxisModel = SLIDE, **others: AxisModel) -> dict[str, Log]:
+    """A log of each ride; others: what another machine it was in some of them."""
+    return {name: logged(others.get(name, machine), ride) for name, ride in RIDES.items()}
+
+
+def fitted(logs: dict[str, Log]) -> Dataset:
+    return identify.fit(MODEL, logs).datasets["x"]
+
+
+def with_force(log: Log, change: Callable[[np.ndarray], np.ndarray]) -> Log:
+    own = log.axes["x"]
+    columns = {**own.columns, "force": change(own.columns["force"].copy())}
+    return replace(log, axes={"x": AxisLog(columns, own.units)})
+
+
+def test_logs_of_one_machine_agree() -> None:
+    assert fitted(runs()).odd is None
+
+
+def test_what_a_model_lacks_in_all_logs_makes_none_of_them_odd() -> None:
+    assert fitted(runs(having(SLIDE, "cogging", p=0.02, a1=0.8))).odd is None
+
+
+def test_another_payload_is_told_with_its_mass() -> None:
+    odd = fitted(runs(run2=replace(SLIDE, mass=1.5 * SLIDE.mass))).odd
+    assert odd is not None
+    assert odd.log == "run2"
+    assert odd.otherwise is not None
+    label, there, elsewhere = odd.otherwise
+    assert label == "mass"
+    assert there / elsewhere == pytest.approx(1.5, rel=0.05)
+
+
+def test_a_push_is_told_with_its_time() -> None:
+    def pushed(force: np.ndarray) -> np.ndarray:
+        force[2000:2200] += 3.0
+        return force
+
+    logs = runs()
+    odd = fitted({**logs, "run1": with_force(logs["run1"], pushed)}).odd
+    assert odd is not None
+    assert odd.log == "run1"
+    assert odd.span is not None
+    assert 1.9 < odd.span[0] <= odd.span[1] < 2.3
+
+
+def test_of_two_logs_none_is_told() -> None:
+    heavy = replace(SLIDE, mass=1.5 * SLIDE.mass)
+    logs = {name: log for name, log in runs(run1=heavy).items() if name in ("run0", "run1")}
+    assert fitted(logs).odd is None
+
+
+def test_a_diagnosis_is_made_without_it() -> None:
+    machine = having(SLIDE, "cogging", p=0.02, a1=0.8)
+    heavy = replace(machine, mass=1.6 * machine.mass)
+    logs = runs(machine, run1=heavy)
+    training = {name: logs[name] for name in ("run0", "run1")}
+    found = identify.diagnose(
+        MODEL, training, {"run2": logs["run2"]}, {"run3": logs["run3"]},
+        catalogue=few("cogging", "spring"),
+    )  # fmt: skip
+    told = found.axes["x"]
+    assert told.named == ("cogging",)
+    assert told.dataset.odd is not None
+    assert told.dataset.odd.log == "run1"
+    assert "run1 disagrees with the other logs" in str(found)
+    assert [log.motion.name for log in told.dataset.training] == ["run0"]
