@@ -85,7 +85,7 @@ class Entry:
         jumps = (
             ()
             if column.wraps is None
-            else (f"jumps back by {column.wraps:.6g}, which wraps takes out",)
+            else (f"jumps back by {column.wraps:.6g}: it wraps",)
         )
         told = "; ".join((f"{self.signal.certainty.value}: {why}", span, *jumps, *self.remarks))
         return f"{self.signal.field} = {{{table}}} # {told}"
