@@ -72,6 +72,7 @@ COMMANDS = {
     "agree": "agree m.toml controller L",
     "check": "check L",
     "compare": "compare m.toml L -o page.html --mcap both.mcap",
+    "cut": "cut L -o part.mcap",
     "diagnose": "diagnose m.toml L -o page.html",
     "export": "export m.toml --to csv -o table L",
     "feedforward": "feedforward m.toml L",
@@ -83,7 +84,7 @@ COMMANDS = {
     "recover": "recover L -o whole.mcap",
     "view": "view L m.toml --html view.html",
 }
-ONE_LOG = ("recover", "view", "export")
+ONE_LOG = ("recover", "view", "export", "cut")
 FEW = ("coulomb_viscous", "quadratic_drag", "wear", "empirical_map")
 FITTED = ("fit", "compare", "diagnose", "add", "plan", "new")
 
