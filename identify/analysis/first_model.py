@@ -409,7 +409,7 @@ def _first_axis(
     motions, found = _told(axis, logs, bodies, known)
     covered, units = excitation(motions, None), motions[0].units
     if own is None:
-        if found.mass is None:
+        if found.mass is None or _of_constant_force(motions):
             raise _untold(axis, motions, found)
         own = AxisModel(_shown(found.mass), rotary=units.rotary)
     constant = next(iter(logs.values())).axes[axis].force_constant
@@ -427,10 +427,39 @@ def _untold(axis: str, motions: Sequence[Motion], found: FirstValues) -> InputEr
             f"{found.reversed:.2g} {units.mass}; give the force or the position the sign -1 "
             "in the import map"
         )
+    if told := _of_constant_force(motions):
+        return InputError(
+            f"axis {axis}: {names}: {told}; give logs of other forces, or the {units.mass_name} "
+            f"itself, in {units.mass} (--mass), which is then held"
+        )
     return InputError(
         f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
         f"little of the force; give a log with faster changes of speed, or the {units.mass_name} "
         f"itself, in {units.mass} (--mass), which is then held"
+    )
+
+
+def _of_constant_force(motions: Sequence[Motion]) -> str:
+    """What a force that never changes tells of mass and friction; empty where it changes.
+
+    m a + b v + Fc = F: of one motion all of m, b and F - Fc may be larger by a factor.
+    """
+    units = motions[0].units
+    force = np.concatenate([m.net for m in motions])
+    level, constant = float(np.median(force)), 0.01  # part of it, by which a constant one changes
+    if not np.std(force) < constant * abs(level):
+        return ""
+    w = [TestFunction.at_least(LENGTHS[0], m.period) for m in motions]
+    rows = list(zip(w, motions, strict=True))
+    acceleration = np.concatenate([f.acceleration(m.velocity) for f, m in rows])
+    velocity = np.concatenate([f.mean(m.velocity[None])[0] for f, m in rows])
+    columns = np.column_stack([np.ones_like(velocity), -velocity])
+    pushed, damped = np.linalg.lstsq(columns, acceleration, rcond=None)[0]
+    name = units.mass_name
+    return (
+        f"the force is {level:.3g} {units.force} throughout, which tells only viscous friction / "
+        f"{name} = {damped:.4g} 1/s and ({abs(level):.3g} {units.force} - Coulomb friction) / "
+        f"{name} = {abs(pushed):.4g} {units.acceleration}"
     )
 
 

@@ -206,7 +206,7 @@ def check(logs: Logs) -> Said:
 
 @app.command()
 def cut(
-    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
+    whole: Annotated[Path, Argument(metavar="LOG", help="MCAP log.")],
     out: Annotated[Path, written("MCAP log to write.")],
     start: Annotated[float, Option("--from", help="Where it begins, s.")] = 0.0,
     stop: Annotated[
@@ -220,11 +220,11 @@ def cut(
     from identify.output.answers.machine import LogAnswer
     from twin.logs import cut_log, read_log, write_log
 
-    made = cut_log(read_log(log), start, stop)
+    made = cut_log(read_log(whole), start, stop)
     write_log(made, out)
     answer = LogAnswer.of(log=out, samples=len(made), sample_rate=made.sample_rate)
-    text = f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {made.metadata['cut']} of {log}"
-    return Said(text, answer)
+    of = f"{made.metadata['cut']} of {whole}"
+    return Said(f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {of}", answer)
 
 
 @app.command()

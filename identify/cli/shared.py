@@ -211,7 +211,7 @@ def with_logs(
     share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]
     # Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
-    meaningless = {"UNIT", "SWAPPED"} if model.joints else {"SIGN", "UNIT", "SWAPPED"}
+    meaningless = {"UNIT", "SWAPPED", "WRAPPED"} | (set() if model.joints else {"SIGN"})
     recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, left_out() as silent, recorded.explaining():

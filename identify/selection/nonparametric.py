@@ -95,12 +95,12 @@ def followed(fitted: Fitted) -> tuple[str, ...]:
 
 
 def nonparametric_labels(axis: AxisModel) -> frozenset[str]:
-    """Labels of the strengths of nonparametric effects, which have no meaning one by one."""
+    """Labels of the parameters of nonparametric effects, which have no meaning one by one."""
     return frozenset(
         f"{f.effect.name}.{p.name}"
         for f in axis.effects
         if f.effect.is_nonparametric
-        for p in f.effect.strengths
+        for p in f.effect.parameters
     )
 
 

@@ -295,3 +295,19 @@ def test_a_machine_is_called_as_it_is_asked(tmp_path):
     done = twin("new", "run.mcap", "-o", "m.toml", "--name", "Stage of hall 3", folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert load_model(tmp_path / "m.toml").name == "Stage of hall 3"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_constant_force_tells_ratios_and_no_mass(tmp_path, noise):
+    rng, t = np.random.default_rng(1), np.arange(600) / 200.0
+    speed = (6.0 - 0.42) / 2.31 * (1.0 - np.exp(-2.31 / 0.19 * t))
+    position = np.cumsum(speed) / 200.0 + 1e-6 * rng.standard_normal(600)
+    force = 6.0 + noise * rng.standard_normal(600)
+    log = Log(200.0, {"x": AxisLog({"position": position, "force": force})})
+    assert check_log(log).ok  # it is an experiment
+    with pytest.raises(InputError, match="the force is 6 N throughout, which tells only") as told:
+        first_model({"run": log}, "m", CATALOGUE)
+    damped, pushed = (
+        float(v) for v in re.findall(r"mass = ([0-9.]+) (?:1/s|m/s)", str(told.value))
+    )
+    assert (damped, pushed) == (pytest.approx(12.16, rel=0.02), pytest.approx(29.37, rel=0.02))

@@ -321,13 +321,13 @@ class Axis:
         The error of a loop goes with speed and acceleration; late readings are the setpoint of an
         earlier time.
         """
-        goal = self.log.columns["setpoint_position"]
         samples = round(lag * self.sample_rate)
-        late = np.r_[np.full(samples, goal[0]), goal[: len(goal) - samples]]
-        error = self.smoother.position(goal - self.log.position)
-        left = self.smoother.position(late - self.log.position)
-        rates = [self.velocity, self.acceleration, np.ones_like(error)]
-        as_loop = _fitted(error, np.column_stack(rates))[1]
+        goal = self.log.columns["setpoint_position"]
+        position = self.log.position[samples:]
+        error = self.smoother.position(goal[samples:] - position)
+        left = self.smoother.position(goal[: len(position)] - position)
+        rates = [self.smoother.velocity(position), self.smoother.acceleration(position)]
+        as_loop = _fitted(error, np.column_stack([*rates, np.ones_like(error)]))[1]
         as_good = 2.0  # times what late readings leave, that a loop may leave
         return as_loop < as_good * float(np.std(left))
 

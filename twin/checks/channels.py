@@ -103,7 +103,7 @@ def _lagging(
     return what, f"give {column} delay_samples = {round(samples)} in the import map"
 
 
-_SLIPS: Mapping[float, str] = {
+SLIPS: Mapping[float, str] = {
     1e3: "a unit a thousand times smaller, as mm for m",
     1e6: "a unit a million times smaller, as um for m",
     180.0 / np.pi: "degrees for radians",
@@ -186,7 +186,7 @@ def _compare(
     if ratio > 0.0:
         off = abs(np.log(ratio))
         looks_like = 0.3  # of the logarithm: how near to a known slip of units a ratio is named so
-        near = [text for s, text in _SLIPS.items() if abs(off - np.log(s)) < looks_like]
+        near = [text for s, text in SLIPS.items() if abs(off - np.log(s)) < looks_like]
         if not near and follows and axis.soft_loop:
             return
         wrong = f"it looks like {near[0]}" if near else "a scale or the sample rate is wrong"

@@ -12,6 +12,7 @@ import numpy as np
 from twin.checks import check_log
 from twin.checks.copies import COMPARED, Copy, copies
 from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
+from twin.checks.together import differences
 from twin.logs.decode import read_parts, require_intact, samples_by_axis
 from twin.logs.log import Log, in_multiples, joined, thinned
 
@@ -72,7 +73,7 @@ def check_file(path: Path) -> CheckReport:
 
 
 def check_files(paths: Sequence[Path]) -> dict[str, CheckReport]:
-    """``check_file`` of each by its name, and which logs are copies of another. Raises InputError.
+    """``check_file`` of each by its name, and which differ from the others or copy one. InputError.
 
     Of each only what is compared is held; of logs too long for that fewer samples, as for a fit.
     """
@@ -83,9 +84,10 @@ def check_files(paths: Sequence[Path]) -> dict[str, CheckReport]:
     for path in paths:
         logs[str(path)], reports[str(path)] = read_checked(path, COMPARED, every)
         require_intact(path)
-    for copy in copies(logs):
-        report = reports[copy.copy]
-        reports[copy.copy] = replace(report, findings=(*report.findings, _told(copy)))
+    told = [(copy.copy, _told(copy)) for copy in copies(logs)]
+    for name, finding in (*told, *differences(logs)):
+        findings = reports[name].findings
+        reports[name] = replace(reports[name], findings=(*findings, finding))
     return reports
 
 
