@@ -105,6 +105,9 @@ def _carried(arm: Arm, joint: int) -> float:
 def told_of(found: Diagnosis) -> list[tuple[tuple[Told, ...], float, str]]:
     """Each answer with those tied with it, how sure it is stated, and its values in words."""
     out = list[tuple[tuple[Told, ...], float, str]]()
+    if found.recording is not None:
+        what = "weight" if "weight" in found.recording.said else found.recording.axis
+        out.append((((RECORDED, what),), 1.0, found.recording.said))
     for body in found.bodies:
         names = tuple(_placed(name, BODY) for name in (body.body, *body.tied))
         mass, band = body.change[0], body.band[0]

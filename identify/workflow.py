@@ -11,6 +11,7 @@ from identify.analysis.cable_force import cable_force as cable_force
 from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
 from identify.analysis.first_model import Masses, unused
 from identify.analysis.first_model import first_model as shown_by
+from identify.analysis.recording import Recording, misassigned
 from identify.analysis.velocity_map import along_track as along_track
 from identify.analysis.velocity_map import friction_map as friction_map
 from identify.analysis.velocity_map import velocity_map as velocity_map
@@ -241,8 +242,12 @@ def diagnose(
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
     known = usable(catalogue, model)
-    parts = as_given(physics_alone(model), logs, holdout, test)
-    result = fit_as_given(*parts, Catalogue([]), test_function, progress, [*known.values()])
+    model, *given = as_given(physics_alone(model), logs, holdout, test)
+    recording = misassigned(model, next(iter(given[0].values()))) if model.joints else None
+    training, selection, tests = (_read(part, recording) for part in given)
+    result = fit_as_given(
+        model, training, selection, tests, Catalogue([]), test_function, progress, [*known.values()]
+    )
     away = departures_of(result.model, result.fits, result.datasets, known, progress)
     axes = {}
     for axis, fitted in away.fits.items():
@@ -268,9 +273,17 @@ def diagnose(
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
         bodies=away.bodies,
+        recording=recording,
     )
     _ = found.model  # it is complete: to tell it computes nothing
     return found
+
+
+def _read(logs: Mapping[str, Log], recording: Recording | None) -> Mapping[str, Log]:
+    """Logs as they are read right."""
+    if recording is None:
+        return logs
+    return {name: recording.read(log) for name, log in logs.items()}
 
 
 def _begun(

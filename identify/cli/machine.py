@@ -107,6 +107,7 @@ def new(
     from identify.analysis.first_model import first_model, not_determined, unused
     from identify.analysis.recording import misassigned
     from identify.output.answers.machine import NewModelAnswer
+    from identify.output.words.recording import recording_in_words
     from twin.effects import load_catalogue
     from twin.files import kept_beside
     from twin.model.file import format_model, read_mjcf, save_model
@@ -131,7 +132,7 @@ def new(
     ]
     text = f"{out}: axes {', '.join(model.axes)}; now `twin diagnose {out} {logs[0]}`"
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
-    doubts = [] if doubt is None else [f"{logs[0]}: warning: {doubt}"]
+    doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]

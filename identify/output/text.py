@@ -44,6 +44,7 @@ from identify.output.words.next_step import (
     supposed_in_words,
     wrong_body_in_words,
 )
+from identify.output.words.recording import read_otherwise_in_words
 from identify.results import figure_of, html_of, report_of, text_of
 from identify.results.results import (
     Addition,
@@ -148,6 +149,8 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     """
     lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
+    if result.recording:
+        lines = [*read_otherwise_in_words(result.recording), *lines]
     for axis, d in result.axes.items():
         said, units, tested = said_of(result, axis), d.base.axis.units, d.tested
         named = f" Missing: {named_in_words(d)}." if d.named else ""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from identify.analysis.recording import Recording
 from identify.dataset.dataset import Dataset, Role, by_log
 from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
@@ -199,6 +200,7 @@ class Diagnosis(Pictured):
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
     with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not
     that of its file, the one that explains most first; the diagnoses are with them as found.
+    recording: how the logs of a mechanism are another than its file needs; all is of them so read.
     """
 
     fitted: MachineModel
@@ -211,6 +213,7 @@ class Diagnosis(Pictured):
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
     bodies: tuple[WrongBody, ...] = ()
+    recording: Recording | None = None
 
     @property
     def body(self) -> WrongBody | None:

@@ -63,7 +63,8 @@ def test_a_fit_in_another_process_is_the_same():
     "result",
     [made.fit_result, made.simulation_fit, made.compared, made.addition, made.diagnosed,
      lambda: made.plan_of("cogging", "wear"), lambda: cogging_case().diagnosis,
-     lambda: cogging_case().addition, lambda: replace(made.diagnosed(), body=made.wrong_body())],
+     lambda: cogging_case().addition,
+     lambda: replace(made.diagnosed(), bodies=(made.wrong_body(),))],
 )  # fmt: skip
 def test_a_result_says_the_same_when_it_comes_back(result):
     given = result()

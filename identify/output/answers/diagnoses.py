@@ -431,12 +431,26 @@ def _(result: CorrectedBody, **more: Any) -> BodyAnswer:
     return BodyAnswer.of(result.body, element=result.element, mujoco=file, **own, **more)
 
 
+class RecordingEntry(Entry):
+    """How a recording is another than a mechanism's file needs; all else is of it as read so."""
+
+    said: str
+    axis: str
+    """Of which it makes most."""
+    before: Number
+    """Part of its torque that bodies and friction leave as it is recorded."""
+    after: Number
+    """The same as it is read."""
+
+
 class DiagnosisAnswer(Answer, DiagnosisEntry):
     """What `twin diagnose` prints: the axis that the answer is about, and the same by axis."""
 
     axes: dict[str, DiagnosisEntry]
     body: BodyEntry | None
     """Of a mechanism, the body of which most is told; the axes are told with it as it was found."""
+    recording: RecordingEntry | None
+    """Of a mechanism, in what its recording is another than its file needs."""
     bodies: list[BodyEntry]
     """All bodies of which something is told."""
     model: str
@@ -453,10 +467,13 @@ def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
     bodies = [BodyEntry.of(body, **_of_body(body, result.fitted)) for body in result.bodies]
     body = next(iter(bodies), None)
+    recording = result.recording and RecordingEntry.of(result.recording)
     leading, model = axes[result.leading.dataset.axis], result.model
     mujoco = model.mjcf if body else None
     written = {"model": format_model(model), "mujoco": mujoco}
-    return DiagnosisAnswer.of(leading, axes=axes, body=body, bodies=bodies, **written, **more)
+    return DiagnosisAnswer.of(
+        leading, axes=axes, body=body, recording=recording, bodies=bodies, **written, **more
+    )
 
 
 def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:

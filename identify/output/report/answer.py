@@ -11,20 +11,26 @@ from identify.output.report.subject import AxisView, Subject
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.next_step import Source, body_in_words, next_step_in_words
+from identify.output.words.recording import read_otherwise_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 
 
 def cards(view: AxisView) -> list[Block]:
-    """The card of an axis; before the first that of a body which is not as its file has it."""
+    """The card of an axis; before the first that of a recording, and of a body, that is another."""
     diagnosis = view.subject.diagnosis
     if not (diagnosis and view.found and view.summary and view.said):
         return [_compared(view)]
     own = _diagnosed(view, diagnosis, view.found, view.summary, view.said)
-    if diagnosis.body is None or view is not view.subject.views[0]:
-        return [own]
-    return [_body(diagnosis, diagnosis.body, view.subject.source), own]
+    first: list[Block] = []
+    if diagnosis.recording is not None:
+        said, *others = read_otherwise_in_words(diagnosis.recording)
+        headline = "The recording is not what the model needs"
+        first.append(AnswerBlock(headline, said, [], others, Tone.STRONG))
+    if diagnosis.body is not None:
+        first.append(_body(diagnosis, diagnosis.body, view.subject.source))
+    return [*(first if view is view.subject.views[0] else []), own]
 
 
 def _body(diagnosis: Diagnosis, body: WrongBody, source: Source) -> AnswerBlock:
