@@ -123,8 +123,8 @@ class _Balance:
         size[size == 0.0] = 1.0
         _, left = nnls((centred[:-1] / size[:, None]).T, centred[-1])
         # Of the larger of both: a torque of nothing is no better than one that is right
-        whole = max(np.linalg.norm(torque * self.torque), np.linalg.norm(self.bodies))
-        return float((left / (whole or 1.0)) ** 2)
+        whole = max(float(np.std(torque * self.torque)), float(np.std(self.bodies)))
+        return float((left / (whole or 1.0)) ** 2) / len(asked)
 
     def ratio(self) -> float:
         """How many times the torque is what the bodies take, friction beside it."""
