@@ -210,11 +210,13 @@ def possible(found: Array, information: Array, bodies: Sequence[Array], most: in
         return root @ block_diag(*each) * size
 
     done = least_squares(left, begun / size, slopes, method="lm", max_nfev=most)
-    return np.concatenate([_inertial(own) for own in np.split(done.x * size, len(bodies))])
+    return np.concatenate([_thick(_inertial(own)) for own in np.split(done.x * size, len(bodies))])
 
 
 LOWER = np.tril_indices(4)
-LEAST = 1e-9  # of a pseudo-inertia's trace: the least that its eigenvalues are
+# Of a body's extent about its centre, squared, the least along any direction: as flat as a file of
+# six digits can have it.
+FLAT = 1e-4
 
 
 def _pseudo(inertial: Array) -> Array:
@@ -228,9 +230,28 @@ def _pseudo(inertial: Array) -> Array:
     return out
 
 
+def _spread(inertial: Array) -> tuple[Array, Array]:
+    """Second moments (3,) of a body about its centre, kg m^2, and their directions (3, 3)."""
+    mass, first = inertial[0], inertial[1:4]
+    second = _pseudo(inertial)[:3, :3] - np.outer(first, first) / mass
+    power, axes = np.linalg.eigh(second)
+    return power, axes
+
+
 def _is_possible(inertial: Array) -> bool:
-    matrix = _pseudo(inertial)
-    return bool(np.linalg.eigvalsh(matrix)[0] > LEAST * np.trace(matrix))
+    if inertial[0] <= 0.0:
+        return False
+    power, _ = _spread(inertial)
+    return bool(power[0] > 0.5 * FLAT * power.sum() > 0.0)
+
+
+def _thick(inertial: Array) -> Array:
+    """The parameters (10,) of a body that is nowhere flatter than a file can have it."""
+    mass, first = max(inertial[0], FLAT), inertial[1:4]
+    power, axes = _spread(np.concatenate([[mass], inertial[1:]]))
+    power = np.maximum(power, FLAT * np.maximum(power, 0.0).sum())
+    second = (axes * power) @ axes.T + np.outer(first, first) / mass
+    return _of_moments(mass, first, second)
 
 
 def _triangle(inertial: Array) -> Array:
@@ -255,11 +276,13 @@ def _inertial(lower: Array) -> Array:
     root = np.zeros((4, 4))
     root[LOWER] = lower
     matrix = root @ root.T
-    second = matrix[:3, :3]
+    return _of_moments(matrix[3, 3], matrix[3, :3], matrix[:3, :3])
+
+
+def _of_moments(mass: float, first: Array, second: Array) -> Array:
+    """The parameters (10,) of a body of that mass, first (3,) and second moments (3, 3)."""
     about = np.trace(second) * np.eye(3) - second
-    return np.array(
-        [matrix[3, 3], *matrix[3, :3], *about.diagonal(), *about[np.triu_indices(3, 1)]]
-    )
+    return np.array([mass, *first, *about.diagonal(), *about[np.triu_indices(3, 1)]])
 
 
 def corrected(
