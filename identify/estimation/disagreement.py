@@ -174,9 +174,7 @@ def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     return np.asarray(tree.query(own.states, distance_upper_bound=close)[0] < close)
 
 
-def _moment(
-    own: _Rows, left: Array, theirs: Sequence[Array], more: float
-) -> Disagreement | None:
+def _moment(own: _Rows, left: Array, theirs: Sequence[Array], more: float) -> Disagreement | None:
     """One moment that stands out against all others of all logs; None where there is none."""
     size = np.abs(left)
     peak = int(np.argmax(size))
