@@ -28,7 +28,8 @@ from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array, rate
 
-OUT = 2.0  # times the error of any other log, where they have been, from which one stands out
+OUT = 2.5  # times the error of any other log, where they have been, from which one stands out
+FEW = 2.0  # times as much asked of three logs, as of two others nobody knows how alike they are
 PEAK = 3.0  # times the largest error of any other moment, from which one stands out
 ALONE = 1.5  # times the error of any other log, that one parameter of its own takes away
 MOMENT = 0.1  # of a log; what lasts longer is no moment
@@ -121,18 +122,20 @@ def _against(
 ) -> Disagreement | None:
     """How a log disagrees with the others; None where it does not."""
     own, others = rows[k], [r for i, r in enumerate(rows) if i != k]
-    step = _step(np.concatenate([r.columns for r in others]),
-                 np.concatenate([r.left for r in others]))  # fmt: skip
+    more = FEW if len(rows) == FEWEST else 1.0
+    step = _step(
+        np.concatenate([r.columns for r in others]), np.concatenate([r.left for r in others])
+    )
     left, theirs = own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
     most = max(map(rms, theirs))
-    if (moment := _moment(own, left, theirs)) is not None:
+    if (moment := _moment(own, left, theirs, more)) is not None:
         return moment
     near, name = _near(own, others), own.log.motion.name
     own_value, seen = _otherwise(own, left, axis, where), rms(left)
     seen = min(seen, rms(left[near])) if near.any() else 0.0
-    if own_value is not None and seen > ALONE * most:
+    if own_value is not None and seen > more * ALONE * most:
         return Disagreement(name, rms(left), most, None, own_value)
-    if seen > OUT * most:
+    if seen > more * OUT * most:
         return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
     return None
 
@@ -171,7 +174,7 @@ def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     return np.asarray(tree.query(own.states, distance_upper_bound=close)[0] < close)
 
 
-def _moment(own: _Rows, left: Array, theirs: Sequence[Array]) -> Disagreement | None:
+def _moment(own: _Rows, left: Array, theirs: Sequence[Array], more: float) -> Disagreement | None:
     """One moment that stands out against all others of all logs; None where there is none."""
     size = np.abs(left)
     peak = int(np.argmax(size))
@@ -190,7 +193,7 @@ def _moment(own: _Rows, left: Array, theirs: Sequence[Array]) -> Disagreement | 
     beside = (own.time < span[0] - length) | (own.time > span[1] + length)
     rest = max(np.abs(r).max(initial=0.0) for r in (*theirs, size[beside]))
     lasts = span[1] - span[0] > MOMENT * (own.time[-1] - own.time[0])
-    if lasts or size[peak] < PEAK * rest:
+    if lasts or size[peak] < more * PEAK * rest:
         return None
     return Disagreement(own.log.motion.name, float(size[peak]), float(rest), span)
 
