@@ -364,3 +364,9 @@ def test_what_takes_longer_or_ends_earlier_is_said_with_both_lengths():
     assert missed(10.0, 10.4) is None
     assert "lasts 6.2 s, not 5 s as asked: its moves take" in missed(5.0, 6.2)
     assert "lasts 3 s, not 5 s as asked: it has no rests" in missed(5.0, 3.0)
+
+
+@pytest.mark.parametrize("name", ["tracking", "moves"])
+def test_an_experiment_that_moves_all_axes_takes_none(name: str) -> None:
+    with pytest.raises(InputError, match=f"axis y: {name} moves all axes .*take one of cable_pass"):
+        twin.simulate(STAGE, name, duration=1.0, axis="y")

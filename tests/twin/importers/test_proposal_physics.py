@@ -163,6 +163,22 @@ def test_an_angle_that_comes_round_is_seen_as_one_motion(tmp_path):
     assert "sure: so called, the motion explains" in text
 
 
+def test_a_counter_that_comes_round_is_asked_for_its_counts_per_turn(tmp_path):
+    counts = np.mod(np.rint(2e3 * 40.0 * SERVO.position), 4096)
+    axes, text, _ = proposed(tmp_path, {"present_position": counts, "torque_Nm": SERVO.force})
+    assert axes["x"]["position"]["wraps"] == 4096
+    assert "counts_per_turn NOT KNOWN" in text
+    assert "counts_per_metre" not in text
+
+
+def test_what_hardly_goes_with_the_motion_is_no_force(tmp_path):
+    noise = np.random.default_rng(3).standard_normal(len(SERVO.force))
+    sag = 48.0 - 0.01 * np.abs(SERVO.force) / np.std(SERVO.force) + 0.02 * noise
+    axes, _, lacks = proposed(tmp_path, {"pos_mm": SERVO.position, "V": sag})
+    assert "force" not in axes["x"]
+    assert "looks like a force" in " ".join(lacks)
+
+
 SIGNALS = {"position": SERVO.position, "setpoint_position": SERVO.setpoint, "force": SERVO.force}
 
 

@@ -18,14 +18,19 @@ def motion_of_force(axis: AxisLog) -> Explained | None:
 
 def doubts_of_log(log: Log) -> Iterator[str]:
     """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each."""
-    return (doubt for name, axis in log.axes.items() for doubt in _of_axis(name, axis))
+    return iter(told_in_log(log).values())
 
 
 def told_in_log(log: Log) -> dict[str, str]:
-    """The same as entries of the log's metadata, "doubt.x.0", which a check reads."""
+    """The same as entries of the log's metadata, "doubt.x.0", which a check reads.
+
+    Of an axis whose counter begins again that is told, and nothing else is.
+    """
+    counted = {key.split(".")[1] for key in log.metadata if key.startswith("counter.")}
     return {
         f"doubt.{name}.{number}": doubt
         for name, axis in log.axes.items()
+        if name not in counted
         for number, doubt in enumerate(_of_axis(name, axis))
     }
 

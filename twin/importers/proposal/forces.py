@@ -167,7 +167,12 @@ def _with_sign(file: File, axis: Axis, signal: Signal, motion: Explained) -> Axi
 def _by_motion(file: File, axis: Axis, candidates: Sequence[Candidate]) -> Axis:
     """Of columns without such a name, the one that the motion explains as a force."""
     position = axis.signals["position"].name
-    told = [c for c in candidates if c.motion.best > TOLD]
+    told = [
+        c
+        for c in candidates
+        # of a column that no name tells the motion makes most
+        if c.motion.best > TOLD and (c.name.quantity in DRIVING or c.motion.explains)
+    ]
     if len(candidates) > 1:  # what goes as the position may be a spring's, where nothing else is
         told = [c for c in told if not file.course(position, c.name)]
     if not told:

@@ -82,11 +82,7 @@ class Entry:
         table = ", ".join(f"{key} = {value}" for key, value in values.items())
         why = ", ".join(self.signal.reasons)
         span = f"{column.values.min():.4g} to {column.values.max():.4g}"
-        jumps = (
-            ()
-            if column.wraps is None
-            else (f"jumps back by {column.wraps:.6g}, which wraps takes out",)
-        )
+        jumps = () if column.wraps is None else (f"jumps back by {column.wraps:.6g}: it wraps",)
         told = "; ".join((f"{self.signal.certainty.value}: {why}", span, *jumps, *self.remarks))
         return f"{self.signal.field} = {{{table}}} # {told}"
 
