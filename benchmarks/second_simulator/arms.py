@@ -87,13 +87,15 @@ class Arm:
 class Changed:
     """By how much a machine is another than its file; each by number of the joint or link.
 
-    payload: kg on the last link's end. mass: kg of a link, with its inertia. rotor: kg m^2 or kg.
-    coulomb: N m or N. load: 1/(N m), growth of the dry friction by the load. spring: N m/rad, about
-    0.2 rad. gain: part by which the motor makes more torque than is recorded. weightless: the
-    recorded torque has the weight of all links taken out.
+    payload: kg on the last link's end, or where it is held, (3,) m of the link's frame. mass: kg of
+    a link, with its inertia. rotor: kg m^2 or kg. coulomb: N m or N. load: 1/(N m), growth of the
+    dry friction by the load. spring: N m/rad, about 0.2 rad. gain: part by which the motor makes
+    more torque than is recorded. weightless: the recorded torque has the weight of all links taken
+    out.
     """
 
     payload: float = 0.0
+    held: tuple[float, float, float] | None = None
     mass: Mapping[int, float] = field(default_factory=dict)
     rotor: Mapping[int, float] = field(default_factory=dict)
     coulomb: Mapping[int, float] = field(default_factory=dict)
@@ -149,7 +151,8 @@ def machine_of(arm: Arm, changed: Changed) -> mujoco.MjModel:
     for i, more in changed.coulomb.items():
         model.dof_frictionloss[i] += more
     if changed.payload:
-        _load(model, len(arm.mass), changed.payload, np.array([arm.size[-1], 0.02, 0.0]))
+        place = changed.held or (arm.size[-1], 0.02, 0.0)
+        _load(model, len(arm.mass), changed.payload, np.array(place))
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 

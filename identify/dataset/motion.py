@@ -13,10 +13,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from identify.dataset.bodies import Bodies
-from identify.dataset.path import Path
+from identify.dataset.path import Path, Slip
 from identify.dataset.readings import (
     ENOUGH,
     resolution_of,
@@ -147,17 +146,6 @@ class OtherAxis:
         """The same of some blocks."""
         at = samples_of(blocks, self.samples, (len(self.readings) - 1) // self.samples)
         return replace(self, readings=self.readings[at.start : at.stop + 1])
-
-
-@dataclass(frozen=True, eq=False)
-class Slip:
-    """What a model moves its laws with memory beside the path of the readings at rest.
-
-    velocity (n,): m/s, by blocks. free (n,): in which blocks the readings let it be any.
-    """
-
-    velocity: Array
-    free: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -89,6 +89,17 @@ class Path:
             self.__dict__.pop(name, None)
 
 
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """What a model moves its laws with memory beside the path of the readings at rest.
+
+    velocity (n,): m/s, by blocks. free (n,): in which blocks the readings let it be any.
+    """
+
+    velocity: Array
+    free: NDArray[np.bool_]
+
+
 def quieted(readings: Array, most: Array, scales: int) -> Array:
     """Readings (n,) m less details on so many time scales of which noise makes so much (n,) m.
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import FEWEST, Disagreement
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.test_function import LOOK
@@ -28,7 +28,8 @@ from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array, rate
 
-OUT = 2.0  # times the error of any other log, where they have been, from which one stands out
+OUT = 2.5  # times the error of any other log, where they have been, from which one stands out
+FEW = 2.0  # times as much asked of three logs, as of two others nobody knows how alike they are
 PEAK = 3.0  # times the largest error of any other moment, from which one stands out
 ALONE = 1.5  # times the error of any other log, that one parameter of its own takes away
 MOMENT = 0.1  # of a log; what lasts longer is no moment
@@ -63,6 +64,19 @@ def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | 
     found = [d for d in each if d is not None]
     same = len({d.log for d in found}) == 1
     return max(found, key=lambda d: d.times) if same else None
+
+
+def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
+    """The log that disagrees with the others of a dataset, by a model with its values.
+
+    Test logs decide nothing: which of the others does is told without them, and that one of them
+    does only where none of the others does.
+    """
+    deciding = (*dataset.training, *dataset.selection)
+    if (odd := disagreeing(axis, deciding)) is not None or not dataset.test:
+        return odd
+    odd = disagreeing(axis, dataset.logs)
+    return odd if odd and odd.log in {log.motion.name for log in dataset.test} else None
 
 
 def _longer(logs: Sequence[PreparedLog]) -> list[PreparedLog]:
@@ -121,18 +135,20 @@ def _against(
 ) -> Disagreement | None:
     """How a log disagrees with the others; None where it does not."""
     own, others = rows[k], [r for i, r in enumerate(rows) if i != k]
-    step = _step(np.concatenate([r.columns for r in others]),
-                 np.concatenate([r.left for r in others]))  # fmt: skip
+    more = FEW if len(rows) == FEWEST else 1.0
+    step = _step(
+        np.concatenate([r.columns for r in others]), np.concatenate([r.left for r in others])
+    )
     left, theirs = own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
     most = max(map(rms, theirs))
-    if (moment := _moment(own, left, theirs)) is not None:
+    if (moment := _moment(own, left, theirs, more)) is not None:
         return moment
     near, name = _near(own, others), own.log.motion.name
     own_value, seen = _otherwise(own, left, axis, where), rms(left)
     seen = min(seen, rms(left[near])) if near.any() else 0.0
-    if own_value is not None and seen > ALONE * most:
+    if own_value is not None and seen > more * ALONE * most:
         return Disagreement(name, rms(left), most, None, own_value)
-    if seen > OUT * most:
+    if seen > more * OUT * most:
         return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
     return None
 
@@ -165,13 +181,14 @@ def _step(columns: Array, force: Array) -> Array:
 
 
 def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
-    """Which rows (n,) of a log are in a state where others have been."""
-    close = 0.3  # of the RMS of each coordinate
-    tree = KDTree(np.concatenate([r.states for r in others]))
-    return np.asarray(tree.query(own.states, distance_upper_bound=close)[0] < close)
+    """Which rows (n,) of a log are in a state where others have been: in one cell of a grid."""
+    cell = 0.5  # of the RMS of each coordinate
+    states = np.concatenate([own.states, *(r.states for r in others)])
+    cells = np.unique(np.floor(states / cell), axis=0, return_inverse=True)[1].reshape(-1)
+    return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
 
-def _moment(own: _Rows, left: Array, theirs: Sequence[Array]) -> Disagreement | None:
+def _moment(own: _Rows, left: Array, theirs: Sequence[Array], more: float) -> Disagreement | None:
     """One moment that stands out against all others of all logs; None where there is none."""
     size = np.abs(left)
     peak = int(np.argmax(size))
@@ -190,7 +207,7 @@ def _moment(own: _Rows, left: Array, theirs: Sequence[Array]) -> Disagreement | 
     beside = (own.time < span[0] - length) | (own.time > span[1] + length)
     rest = max(np.abs(r).max(initial=0.0) for r in (*theirs, size[beside]))
     lasts = span[1] - span[0] > MOMENT * (own.time[-1] - own.time[0])
-    if lasts or size[peak] < PEAK * rest:
+    if lasts or size[peak] < more * PEAK * rest:
         return None
     return Disagreement(own.log.motion.name, float(size[peak]), float(rest), span)
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import Valued, actual_force, parts_of, reading_error, true_motion
-from identify.dataset.motion import Blocks, Motion, Slip
+from identify.dataset.motion import Blocks, Motion
+from identify.dataset.path import Slip
 from identify.dataset.prepared_log import (
     PreparedLog,
     motor_gain,

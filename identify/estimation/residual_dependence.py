@@ -55,8 +55,8 @@ UNITS = {
     "other_axis_position": "m",
     "other_axis_velocity": "m/s",
     "other_axis_acceleration": "m/s^2",
-    **{field: LINEAR_UNITS[field] for field in CHANNELS.values()},
 }
+OF_CHANNELS = {field: LINEAR_UNITS[field] for field in CHANNELS.values()}
 
 
 def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) -> str:
@@ -69,7 +69,8 @@ def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) 
             if coordinate == beside(axis, quantity):
                 return other.units(UNITS[quantity])
     units = motion.other_units if coordinate.startswith(OTHER) else motion.units
-    return units(linear.get(coordinate, LINEAR.position))
+    known = {**OF_CHANNELS, **linear}
+    return units(known.get(coordinate, LINEAR.position))
 
 
 def share(residual: Array, coordinate: Array) -> float:

@@ -43,7 +43,8 @@ class WrongBody:
     effects of joints ("rotor_inertia of elbow"). axes: whose forces it changes.
     inertial, change, band (10,): each of INERTIAL as the file has it, by how much it is more, and
     half the 90 % band of that; no number where the logs do not tell it. score: over all joints.
-    errors: N, of each axis without and with all bodies that were found.
+    errors: N, of each axis without and with all bodies that were found. disagreeing: names of the
+    logs that by themselves tell another change.
     """
 
     body: str
@@ -55,6 +56,7 @@ class WrongBody:
     band: Array
     score: Score
     errors: Mapping[str, Errors]
+    disagreeing: tuple[str, ...] = ()
 
     @property
     def differing(self) -> dict[str, tuple[float, float]]:
@@ -88,8 +90,11 @@ class WrongBody:
 
     @property
     def confidence(self) -> float:
-        """How often answers with such a score were right, 0..1."""
-        return confidence(self.score.part, self.score.t)
+        """How often answers with such a score were right, 0..1.
+
+        Of what logs disagree about, that of a gain which hardly differs from chance.
+        """
+        return confidence(self.score.part, 0.0 if self.disagreeing else self.score.t)
 
 
 @dataclass(frozen=True, eq=False)

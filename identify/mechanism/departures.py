@@ -153,6 +153,7 @@ def _told_of(
         inertial=body.inertial,
         change=told.changes[name],
         band=told.bands[name],
+        disagreeing=told.disagreeing[name],
         score=moved.score,
         errors=errors,
     )
@@ -160,10 +161,14 @@ def _told_of(
 
 @dataclass(frozen=True, eq=False)
 class _Told:
-    """What a regression tells of bodies, by name: changes (10,), half their 90 % bands (10,)."""
+    """What a regression tells of bodies, by name.
+
+    Changes (10,), half their 90 % bands (10,), and the logs that tell another change.
+    """
 
     changes: Mapping[str, Array] = field(default_factory=dict)
     bands: Mapping[str, Array] = field(default_factory=dict)
+    disagreeing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
@@ -181,14 +186,15 @@ class _Told:
         )
         columns, weights = regression.training.columns[:, where], np.eye(len(where))
         bands = half_widths_by(columns.copy(), left, weights)
-        changes, told = {}, {}
+        changes, told, apart = {}, {}, {}
         for i in (i for i in asked if groups[i].what is What.BODY):
             span = regression.spans[i]
             own, other = found.values[span], (beside or found).values[span]
             band = np.hypot(bands[np.isin(where, _range(span))], other - own)
             known = regression.known_by_data(asked, span)
             changes[groups[i].place], told[groups[i].place] = own, np.where(known, band, np.nan)
-        return cls(changes, told)
+            apart[groups[i].place] = tuple(regression.disagreeing(asked, found, i))
+        return cls(changes, told, apart)
 
 
 def _beside_gains(regression: Regression, asked: Sequence[int]) -> Solution | None:

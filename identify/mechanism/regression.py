@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import blocks_of, effective_samples, rms
 from identify.estimation.force_balance import jacobian
@@ -33,13 +34,15 @@ class Rows:
     """Rows of some logs: force (n,), torque (n,) of the motor and columns (n, p), over a weight.
 
     force: what the model lacks, the residual's opposite, so that columns times changes make it.
-    joint (n,): number of the joint of each. time (n,): by which they are in order.
+    joint, log (n,): number of the joint and of the log of each. time (n,): s, by which they are in
+    order within a log.
     """
 
     force: Array
     torque: Array
     columns: Array
     joint: NDArray[np.int_]
+    log: NDArray[np.int_]
     time: Array
 
     @classmethod
@@ -47,7 +50,7 @@ class Rows:
         """In the order of time."""
         names = [f.name for f in fields(cls)]
         every = cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
-        return every.some(np.argsort(every.time, kind="stable"))
+        return every.some(np.lexsort((every.time, every.log)))
 
     def some(self, which: NDArray[Any]) -> Rows:
         """Those of some places, or where a mask says so."""
@@ -57,7 +60,7 @@ class Rows:
         """Each over the weight (n_joints,) of its joint."""
         by = weights[self.joint]
         force, torque, columns = self.force / by, self.torque / by, self.columns / by[:, None]
-        return Rows(force, torque, columns, self.joint, self.time)
+        return replace(self, force=force, torque=torque, columns=columns)
 
     @cached_property
     def gram(self) -> Array:
@@ -91,7 +94,7 @@ class Regression:
     """The rows of the training logs and of logs that are not fitted, and what may be asked.
 
     base: columns of the joints' own free parameters. spans: columns of each group. samples: the
-    effective number of rows of each group of logs.
+    effective number of rows of each group of logs. logs: names of all.
     """
 
     training: Rows
@@ -100,6 +103,7 @@ class Regression:
     groups: Sequence[Group]
     spans: Sequence[slice]
     samples: tuple[float, float]
+    logs: Sequence[str]
 
     def solved(self, chosen: Iterable[int], held: Mapping[int, Array] | None = None) -> Solution:
         """The least squares with some groups beside the base; held: groups at these values."""
@@ -204,6 +208,23 @@ class Regression:
         inverse = np.linalg.inv(whole / size / size[:, None]) / size / size[:, None]
         return np.asarray(np.diag(inverse) * prior < most)
 
+    def disagreeing(self, chosen: Sequence[int], found: Solution, group: int) -> list[str]:
+        """Names of the logs that by themselves tell another change of a group than all together.
+
+        Beside the same other groups, and the joints' own parameters as each log has them.
+        """
+        own, out = found.values[self.spans[group]], list[str]()
+        numbers = np.unique(np.concatenate([self.training.log, self.other.log]))
+        for number in numbers if numbers[1:].size else []:
+            both = [r.some(r.log == number) for r in (self.training, self.other)]
+            rows = max(both, key=lambda r: len(r.force))
+            alone = replace(self, training=rows, other=rows)
+            held, free = alone.solved(chosen, {group: own}), alone.solved(chosen)
+            score = alone.score(held, free, len(numbers))
+            if replace(score, other=score.training).accepted:
+                out.append(self.logs[number])
+        return out
+
     def left(self, found: Solution) -> tuple[Array, Array]:
         """What a solution leaves of the rows of both groups of logs, in their weights."""
         both = (self.training, self.other)
@@ -244,26 +265,27 @@ def regression_of(before: Mapping[str, Judged], groups: Sequence[Group]) -> Regr
     spans = [slice(a, b) for a, b in pairwise(ends)]
     floors = np.array([j.fit.floor for j in before.values()])
     holdout = all(j.dataset.selection for j in before.values())
+    names = _names(j.dataset for j in before.values())
 
     def rows(fitted: bool) -> Rows:
         each = enumerate(zip(before.values(), spans, strict=False))
-        parts = [_rows_of(i, own, span, groups, ends, fitted) for i, (own, span) in each]
+        parts = [_rows_of(i, own, span, groups, ends, fitted, names) for i, (own, span) in each]
         return Rows.together(parts).over(floors)
 
     first, second = (rows(True), rows(False)) if holdout else rows(True).halved()
     own, of_groups = slice(0, sum(begun)), spans[len(begun) :]
     apart = len(first.force) / OVERLAP, len(second.force) / OVERLAP  # that share no instant
-    plain = Regression(first, second, own, groups, of_groups, apart)
+    plain = Regression(first, second, own, groups, of_groups, apart, names)
     return _by_what_is_left(_with_torques(plain))
 
 
 def _rows_of(
     joint: int, judged: Judged, span: slice, groups: Sequence[Group], ends: Sequence[int],
-    fitted: bool,
+    fitted: bool, names: Sequence[str],
 ) -> Rows:  # fmt: skip
     """The rows of one joint, of the training logs or of those that are not fitted, in N.
 
-    span: columns of its own free parameters. ends: of all columns.
+    span: columns of its own free parameters. ends: of all columns. names: of all logs.
     """
     fit, dataset = judged.fit, judged.dataset
     logs = dataset.training if fitted else dataset.selection
@@ -276,9 +298,9 @@ def _rows_of(
         own = slice(ends[first + g], ends[first + g + 1])
         columns[:, own] = np.concatenate([group.columns(log) for log in logs])[kept]
     torque = np.concatenate([log.fine.mean(log.motion.raw[1]) for log in logs])[kept]
-    day = 86400.0  # s, more than a log: each has times of its own
-    time = np.concatenate([day * k + log.time for k, log in enumerate(logs)])[kept]
-    return Rows(-force[kept], torque, columns, np.full(len(time), joint), time)
+    time = np.concatenate([log.time for log in logs])[kept]
+    number = np.repeat([names.index(log.motion.name) for log in logs], [len(log) for log in logs])
+    return Rows(-force[kept], torque, columns, np.full(len(time), joint), number[kept], time)
 
 
 def _with_torques(plain: Regression) -> Regression:
@@ -311,12 +333,17 @@ def _by_what_is_left(plain: Regression) -> Regression:
     each = [
         [rms(own[rows.joint == j]) for own, rows in zip(left, both, strict=True)] for j in joints
     ]
-    weights = np.maximum(np.mean(each, axis=1), 1.0)
+    weights = np.maximum(np.min(each, axis=1), 1.0)
     count = [effective_samples(own / weights[r.joint]) for own, r in zip(left, both, strict=True)]
     return replace(
         plain, training=both[0].over(weights), other=both[1].over(weights),
         samples=(count[0], count[1]),
     )  # fmt: skip
+
+
+def _names(datasets: Iterable[Dataset]) -> tuple[str, ...]:
+    """Of all logs, each once."""
+    return tuple(dict.fromkeys(log.motion.name for d in datasets for log in d.logs))
 
 
 def _squares(gram: Array, values: Array) -> float:

@@ -413,6 +413,8 @@ class BodyEntry(Entry):
     """That differ from the file by more than their band."""
     not_told: list[str] = read("undetermined")
     """By these joints, or only together with others."""
+    disagreeing: list[str]
+    """Logs that by themselves tell another change."""
     errors: dict[str, ErrorsEntry]
 
 

@@ -196,6 +196,11 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             "measured predicts and no sensor makes. Its origin is not known: it counts as noise, "
             "of the drive or of its surroundings"
         )
+    if dataset.looks > 1:
+        said.append(
+            f"the {words('force')} is averaged over {quantity(dataset.test_function_length, 's')}: "
+            "a length asked besides, as it shows what the one hides that the noise asks for"
+        )
     if dataset.odd:
         said.append(odd_in_words(dataset))
     said += [

@@ -309,6 +309,11 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     ]
     if found.undetermined:
         said.append(f"These joints do not tell its {listed(found.undetermined)}.")
+    if found.disagreeing:
+        said.append(
+            f"The logs disagree about it: {listed(found.disagreeing)} tell another change, so that "
+            "the load is not the same in all, or is held another way; diagnose them one by one."
+        )
     errors = [
         f"{axis} {arrow(e.before, e.after, model.axes[axis].units.force)}"
         for axis, e in found.errors.items()

@@ -82,6 +82,17 @@ def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_val
     assert given == pytest.approx(ARM.armature[1] + 0.4 * OWN[1], rel=0.02)
 
 
+def test_logs_of_a_load_that_is_held_another_way_disagree():
+    ways = [Changed(payload=0.8, held=(0.25, 0.0, z)) for z in (0.1, -0.1)]
+    logs = [{f"{i}": log_of(ARM, way, 50 + i, 8.0)} for i, way in enumerate(ways)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", ARM.text))
+    found = diagnose(model, *logs, catalogue=FEW)
+    (body,) = found.bodies
+    assert body.disagreeing
+    assert body.confidence < 0.9
+    assert "The logs disagree about it" in str(found)
+
+
 def test_a_body_has_the_nearest_parameters_that_it_can_have():
     ball = np.array([2.0, 0.0, 0.0, 0.0, 0.02, 0.02, 0.02, 0.0, 0.0, 0.0])
     assert possible(ball, np.eye(10), [ball]) is ball
