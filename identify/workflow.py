@@ -23,7 +23,7 @@ from identify.dataset.prepared_log import sticks
 from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
-from identify.estimation.disagreement import disagreeing
+from identify.estimation.disagreement import odd_in
 from identify.estimation.fit import Fit, error_if_any
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
@@ -161,7 +161,7 @@ def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     dataset, fitted = fit_aligned(axis, dataset)
     dataset, fitted = with_own_noise(fitted, dataset)
     require_finite(fitted.residual, dataset)
-    return replace(dataset, odd=disagreeing(fitted.axis, dataset.logs)), fitted
+    return replace(dataset, odd=odd_in(fitted.axis, dataset)), fitted
 
 
 @parallel()

@@ -193,12 +193,13 @@ def check(logs: Logs) -> Said:
     from identify.dataset.odd_log import FEWEST
     from identify.output.answers.machine import check_answer
     from identify.output.machine import check_text
-    from identify.output.words.odd import with_odd
-    from identify.workflow import odd_logs
     from twin.checks.long import check_files
 
     reports = check_files(logs)
     if len(logs) >= FEWEST and all(report.ok for report in reports.values()):
+        from identify.output.words.odd import with_odd
+        from identify.workflow import odd_logs
+
         reports = with_odd(reports, odd_logs(logs))
     answer = check_answer(reports)
     return Said(check_text(reports), answer, fine=answer.ok)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import FEWEST, Disagreement
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.test_function import LOOK
@@ -64,6 +64,19 @@ def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | 
     found = [d for d in each if d is not None]
     same = len({d.log for d in found}) == 1
     return max(found, key=lambda d: d.times) if same else None
+
+
+def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
+    """The log that disagrees with the others of a dataset, by a model with its values.
+
+    Test logs decide nothing: which of the others does is told without them, and that one of them
+    does only where none of the others does.
+    """
+    deciding = (*dataset.training, *dataset.selection)
+    if (odd := disagreeing(axis, deciding)) is not None or not dataset.test:
+        return odd
+    odd = disagreeing(axis, dataset.logs)
+    return odd if odd and odd.log in {log.motion.name for log in dataset.test} else None
 
 
 def _longer(logs: Sequence[PreparedLog]) -> list[PreparedLog]:
@@ -168,10 +181,11 @@ def _step(columns: Array, force: Array) -> Array:
 
 
 def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
-    """Which rows (n,) of a log are in a state where others have been."""
-    close = 0.3  # of the RMS of each coordinate
-    tree = KDTree(np.concatenate([r.states for r in others]))
-    return np.asarray(tree.query(own.states, distance_upper_bound=close)[0] < close)
+    """Which rows (n,) of a log are in a state where others have been: in one cell of a grid."""
+    cell = 0.5  # of the RMS of each coordinate
+    states = np.concatenate([own.states, *(r.states for r in others)])
+    cells = np.unique(np.floor(states / cell), axis=0, return_inverse=True)[1].reshape(-1)
+    return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
 
 def _moment(own: _Rows, left: Array, theirs: Sequence[Array], more: float) -> Disagreement | None:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
-from identify.estimation.disagreement import disagreeing
+from identify.estimation.disagreement import odd_in
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.doubts import Conclusion
 
@@ -28,7 +28,7 @@ def without_odd_log(
 
     conclude: what a fit of some logs comes to.
     """
-    odd = disagreeing(base.axis, dataset.logs)
+    odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
         ended = conclude(*_others(base, dataset, odd))
         first, odd = odd, _odd_beside(ended, dataset)
@@ -38,8 +38,8 @@ def without_odd_log(
 
 
 def _others(base: Fit, dataset: Dataset, odd: Disagreement | None) -> tuple[Fit, Dataset]:
-    """The fit of the logs but an odd one, and these."""
-    if odd is None:
+    """The fit of the logs but an odd one, and these; a test log stays, as it decides nothing."""
+    if odd is None or odd.log in {log.motion.name for log in dataset.test}:
         return base, dataset
     rest = dataset.without(odd.log)
     if [*rest.training] == [*dataset.training]:
@@ -53,4 +53,4 @@ def _odd_beside(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
     there = realigned(dataset, found.channel_delay)
     if found.test_function_length != dataset.test_function_length:
         there = there.at_length(found.test_function_length)
-    return disagreeing(ended.found.final.fit.axis, there.logs)
+    return odd_in(ended.found.final.fit.axis, there)

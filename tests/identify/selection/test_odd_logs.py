@@ -74,9 +74,9 @@ def test_a_diagnosis_is_made_without_it() -> None:
     machine = having(SLIDE, "cogging", p=0.02, a1=0.8)
     heavy = replace(machine, mass=1.6 * machine.mass)
     logs = runs(machine, run1=heavy)
-    training = {name: logs[name] for name in ("run0", "run1")}
+    training = {name: logs[name] for name in ("run0", "run1", "run2")}
     found = identify.diagnose(
-        MODEL, training, {"run2": logs["run2"]}, {"run3": logs["run3"]},
+        MODEL, training, {"run3": logs["run3"]},
         catalogue=few("cogging", "spring"),
     )  # fmt: skip
     told = found.axes["x"]
@@ -84,4 +84,4 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert told.dataset.odd is not None
     assert told.dataset.odd.log == "run1"
     assert "run1 disagrees with the other logs" in str(found)
-    assert [log.motion.name for log in told.dataset.training] == ["run0"]
+    assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
