@@ -161,7 +161,8 @@ def _fitted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     dataset, fitted = fit_aligned(axis, dataset)
     dataset, fitted = with_own_noise(fitted, dataset)
     require_finite(fitted.residual, dataset)
-    return replace(dataset, odd=odd_in(fitted.axis, dataset)), fitted
+    odd = odd_in(fitted.axis, dataset)
+    return replace(dataset, odd=odd if odd and odd.is_sure else None), fitted
 
 
 @parallel()

@@ -27,3 +27,12 @@ class Disagreement:
     def times(self) -> float:
         """Its error over that of the others."""
         return self.error / self.others
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is told before the model has all that it lacks, which may look like it.
+
+        Far out, with one value of its own or in a part of its time.
+        """
+        far = 4.0  # times the error of the others
+        return self.times > far and (self.otherwise is not None or self.span is not None)
