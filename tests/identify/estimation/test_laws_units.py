@@ -32,8 +32,8 @@ FRICTION = {"Fc": 0.4, "Fs": 0.4, "sigma2": 1.1}
 MASS = 2.3  # kg
 SMALL = 0.03  # N RMS of each effect
 SAME = 1e-3  # relative, between the ends of two searches that stop at a small fall of the error
-# A plain axis has nothing of what those of joints read.
-EFFECTS = [e for e in CATALOGUE.values() if not (e.is_nonparametric or e.of_joints)]
+# A plain axis has nothing of what those of joints read, and these logs no channels.
+EFFECTS = [e for e in CATALOGUE.values() if not (e.is_nonparametric or e.of_joints or e.channels)]
 TURNING = {e.name for e in EFFECTS if e.suits and e.suits((), True) > e.suits((), False)}
 IN_METRES = {"encoder_ripple.period"}  # tried at the signal periods of the scales that are sold
 

@@ -342,7 +342,7 @@ def test_curves_count_as_many_parameters_as_they_are_worth(held):
 def test_descriptions_are_told_from_physics():
     axis = axis_of(fitted("cogging"), Fitted.at_start(MAP_EFFECT))
     labels = nonparametric_labels(axis)
-    assert labels == {f"{MAP_EFFECT.name}.{p.name}" for p in MAP_EFFECT.strengths}
+    assert labels == {f"{MAP_EFFECT.name}.{p.name}" for p in MAP_EFFECT.parameters}
     assert nonparametric_labels(PLAIN) == frozenset()
     stage = MachineModel("s", {"x": axis, "y": replace(PLAIN, mass=7.0)})
     found = physics_alone(stage)
