@@ -30,6 +30,8 @@ from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
+SETTLED = 1e-3  # of a sample, from which on a channel delay is where it stays
+
 
 def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     """The fit of an axis, and the dataset with its channel delay removed.
@@ -64,7 +66,7 @@ def _shifted(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
         if again.error > 1.001 * fit.error:
             break
         dataset, fit = moved, again
-        if abs(last) < 1e-3 * dataset.training[0].motion.sample_period:
+        if abs(last) < SETTLED * dataset.training[0].motion.sample_period:
             break
     return dataset, fit
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.alignment import fit_aligned, realigned
+from identify.estimation.alignment import SETTLED, fit_aligned, realigned
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on, finished
 from identify.estimation.residual_noise import with_own_noise
@@ -90,7 +90,8 @@ def _at_its_best(found: Found) -> Found:
     for _ in range(MOST_REFITS):
         before, delay = fit, dataset.channel_delay
         dataset, fit = fit_aligned(fit.axis, realigned(dataset, 0.0))
-        if dataset.channel_delay == delay and _is_level(before, fit, dataset):
+        later = abs(dataset.channel_delay - delay) / dataset.training[0].motion.sample_period
+        if later < SETTLED and _is_level(before, fit, dataset):
             break
     if RULE.fallen * fit.error > final.fit.error:
         return found

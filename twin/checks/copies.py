@@ -249,7 +249,7 @@ class Stretch:
             position = self.pair((axis, "position"), window)
             if not position.varies:  # at rest any two logs agree
                 continue
-            moves, same = True, position.agrees(True)
+            moves, same = True, not position.is_another_motion and position.agrees(True)
             if same is False:
                 return False
             shows = shows or same is True

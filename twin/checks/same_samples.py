@@ -110,6 +110,13 @@ class Pair:
         )
 
     @property
+    def is_another_motion(self) -> bool:
+        """Whether positions part by more than a filter or noise does, which is told at once."""
+        apart = float(np.var(self.nearest.rest))
+        # a half and ten times, RMS
+        return apart > max(0.25 * float(np.var(self.short)), 100.0 * max(self.noise))
+
+    @property
     def grid(self) -> float:
         """The step of a rounding by which a copy may be off: none where the readings are its own.
 
