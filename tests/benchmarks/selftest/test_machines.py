@@ -128,6 +128,7 @@ def in_small(*rivals: str) -> Setting:
     return Setting(replace(stage, sample_rate=2500.0), few, 4.0)
 
 
+@pytest.mark.slow
 def test_trials_in_small_name_what_is_planted_and_nothing_else():
     # Twenty times the floor: far above what a log of 4 s needs, so any seed will do.
     case = Case(("quadratic_drag",), 20.0, 1)

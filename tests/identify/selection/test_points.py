@@ -274,7 +274,7 @@ BUMPS = having(
 NEAR_BUMPS = ("backlash", "cogging", "flexible_mode", "presliding_hysteresis")
 
 
-@pytest.mark.parametrize("size", [1.0, 5.0])
+@pytest.mark.parametrize("size", [pytest.param(1.0, marks=pytest.mark.slow), 5.0])
 @pytest.mark.parametrize(
     "names",
     [NEAR_BUMPS, pytest.param(tuple(CATALOGUE), marks=pytest.mark.slow)],

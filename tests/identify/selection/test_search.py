@@ -185,6 +185,7 @@ def test_of_a_friction_those_that_explain_as_much_are_told_with_the_same_values_
     assert found.findings[0].bend is not None
 
 
+@pytest.mark.slow
 def test_a_hysteresis_that_leaves_no_friction_is_another_friction() -> None:
     true = with_friction("gms", Fs=0.3, spread=4.0, C=68.0)
     found = asked(SLIDE, true, few("presliding_hysteresis"))
