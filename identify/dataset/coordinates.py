@@ -14,6 +14,7 @@ from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.readings import FEWEST_CYCLES
 from identify.dataset.spectrum import Record, find_lines, lines_in_time
 from identify.rules import RULE
+from twin.core.walks import CHANNEL_ROW
 from twin.effect import CHANNELS, Excitation
 from twin.excitation import Repeating
 from twin.signals import Array
@@ -42,10 +43,10 @@ def coordinates_of(log: PreparedLog) -> dict[str, Array]:
         "time": log.time,
         "distance_since_reversal": mean(since_reversal(m.velocity, m.period)),
     }
-    if m.others[:3].any():
-        for name, row in zip(QUANTITIES, m.others[:3], strict=True):
+    if m.others[:CHANNEL_ROW].any():
+        for name, row in zip(QUANTITIES, m.others[:CHANNEL_ROW], strict=True):
             out[f"{OTHER}{name}"] = mean(row)
-    for name, row in zip(CHANNELS.values(), m.others[3:], strict=False):
+    for name, row in zip(CHANNELS.values(), m.others[CHANNEL_ROW:], strict=False):
         if name in m.channels:
             out[name] = mean(row)
     for axis, other in m.beside.items():
@@ -152,9 +153,9 @@ def _both_ways(position: Array, velocity: Array, fast: float) -> float:
 
 def _temperature(motions: Sequence[Motion]) -> float:
     """Mean of what the logs hold of it, K; that of a room where they do not."""
-    row = 3 + [*CHANNELS.values()].index("temperature")
+    row = CHANNEL_ROW + [*CHANNELS.values()].index("temperature")
     logged = [m.others[row] for m in motions if "temperature" in m.channels]
-    return float(np.mean(np.concatenate(logged))) if logged else 293.15
+    return float(np.mean(np.concatenate(logged))) if logged else Excitation.temperature
 
 
 def _told(motion: Motion) -> float:
