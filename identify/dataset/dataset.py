@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from identify.dataset.odd_log import Disagreement
 from identify.dataset.prepared_log import EVERYWHERE, PreparedLog
 from twin.effect import Excitation
+from twin.model.machine import AxisModel
 from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
@@ -108,6 +109,11 @@ class Dataset:
         return replace(
             self.with_logs(log.at_length(length) for log in self.logs), looks=self.looks + 1
         )
+
+    def kept_in(self, axis: AxisModel) -> AxisModel:
+        """An axis that was found on these logs, with what others need to tell the same errors."""
+        length, delay = self.test_function_length, self.channel_delay
+        return replace(axis, test_function=length, channel_delay=delay)
 
     def forget(self) -> None:
         """Let go of what is made of the columns of its logs, where these are held."""

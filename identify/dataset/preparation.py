@@ -33,7 +33,7 @@ from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
 from twin.errors import InputError
 from twin.logs import Log
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import spread
 from twin.threads import trim_memory
 
@@ -116,7 +116,8 @@ def _of_axis(
         return partial(_long_enough, made)
 
     deciding = motions_at(Role.TRAINING, Role.SELECTION)
-    length = test_function or choose_length(deciding, imposed=axis.is_imposed)
+    length = test_function or _kept(axis, deciders)
+    length = length or choose_length(deciding, imposed=axis.is_imposed)
     fit, held = deciding(length)
     (test,) = motions_at(Role.TEST)(length)
     begun = {} if axis.is_imposed else _begun(fit, held, test)
@@ -132,6 +133,14 @@ def _of_axis(
         covered=Covered(tuple(fit), axis.hardware.travel),
         begun=begun,
     )
+
+
+def _kept(axis: AxisModel, logs: Sequence[Log]) -> float | None:
+    """The length (s) that an axis was found at, where the samples of the logs allow it."""
+    shortest = LEAST_BLOCKS * max(log.period for log in logs)
+    longest = max(len(log) * log.period for log in logs)
+    length = axis.test_function
+    return length if length and shortest <= length < longest else None
 
 
 def _begun(

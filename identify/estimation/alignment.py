@@ -37,12 +37,13 @@ def fit_aligned(axis: AxisModel, dataset: Dataset) -> tuple[Dataset, Fit]:
     """The fit of an axis, and the dataset with its channel delay removed.
 
     The time origins of its logs are set by the phase of what repeats in time. A model that was
-    fitted before begins with the channel delay that its values tell: without it, the fit would
-    leave them.
+    fitted before begins with the channel delay that it was found with, or that its values tell:
+    without it, the fit would leave them.
     """
-    known = _moved_by_values(axis, dataset)
-    begun = [dataset, known] if known is not dataset else [dataset]
-    dataset, fit = min((_shifted(axis, each) for each in begun), key=lambda one: one[1].error)
+    known = _moved_by_values(axis, realigned(dataset, axis.channel_delay))
+    delays = dict.fromkeys((dataset.channel_delay, known.channel_delay))
+    begun = (_shifted(axis, realigned(dataset, delay)) for delay in delays)
+    dataset, fit = min(begun, key=lambda one: one[1].error)
     if not depends_on_time_origin(fit.axis, dataset):
         return synchronised(fit, dataset)
     dataset = with_time_origins(fit.axis, dataset)
@@ -76,7 +77,8 @@ def aligned(axis: AxisModel, dataset: Dataset) -> Dataset:
 
     No parameter is fitted; ``fit_aligned`` does the same together with a fit.
     """
-    return with_time_origins(axis, _moved_by_values(axis, dataset))
+    begun = realigned(dataset, axis.channel_delay)
+    return with_time_origins(axis, _moved_by_values(axis, begun))
 
 
 def _moved_by_values(axis: AxisModel, dataset: Dataset) -> Dataset:

@@ -230,7 +230,8 @@ class Diagnosis(Pictured):
         for axis, found in self.axes.items():
             if found.findings:
                 mass = model.axes[axis].mass if bodies else found.final.axis.mass
-                model = model.with_axis(axis, replace(found.final.axis, mass=mass))
+                better = replace(found.final.axis, mass=mass)
+                model = model.with_axis(axis, found.dataset.kept_in(better))
                 after = self.summaries[axis].after
                 model = model.with_intervals(axis, intervals_to_keep(found.final, after))
                 model = model.with_history(*_steps_of(found))

@@ -181,6 +181,8 @@ def _axis(
             mass_fixed=bool(entry.fixed) or name in bodies,
             rotary=units.rotary,
             joint=entry.joint,
+            test_function=entry.test_function,
+            channel_delay=entry.channel_delay or 0.0,
         )
 
 
@@ -250,6 +252,12 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
             unit, comma, meaning = known.partition(",")
             item = tomlkit.item(list(value) if key == "travel" else value)
             table[key] = item.comment(f"{units(unit)}{comma}{meaning}")
+    if axis.test_function is not None:
+        length = tomlkit.item(axis.test_function)
+        table["test_function"] = length.comment("s, over which a fit averages forces")
+    if axis.channel_delay:
+        delay = tomlkit.item(axis.channel_delay)
+        table["channel_delay"] = delay.comment("s, by which the force is stamped late")
     effects = tomlkit.table(is_super_table=True)
     for fitted in axis.effects:
         entry = tomlkit.table()

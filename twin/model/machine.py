@@ -182,6 +182,12 @@ class AxisModel:
     """Whether the axis turns: all lengths are then angles (rad), forces torques (N m)."""
     joint: str | None = None
     """Name of its joint or fixed tendon in the machine's MuJoCo file; None: a plain axis."""
+    test_function: float | None = None
+    """Length of the test functions, s, at which a diagnosis found this model, and at which its
+    errors were told. None: chosen from the logs."""
+    channel_delay: float = 0.0
+    """By how much the force acts before its time stamp in the logs that a diagnosis found this
+    model on, s. A fit begins with it; where others explain its logs better, it takes these."""
 
     def __post_init__(self) -> None:
         name, unit = self.units.mass_name, self.units.mass

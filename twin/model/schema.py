@@ -95,6 +95,12 @@ class AxisEntry(Entries):
     acceleration: float | None = _quantity("m/s^2", "fastest move")
     jerk: float | None = _quantity("m/s^3", "fastest move")
     bandwidth: float | None = _quantity("Hz", "of the position loop", most=1e6)
+    test_function: float | None = _quantity(
+        "s", "over which a fit averages forces; where left out, chosen from the logs", most=1e3
+    )
+    channel_delay: float | None = _quantity(
+        "s", "by which the force is stamped later than it acts", zero=True, most=1.0
+    )
     effects: dict[str, EffectEntry] = Field(
         {}, description="a table for each effect, as in [axes.x.effects.cogging]"
     )
