@@ -41,7 +41,8 @@ class Dataset:
     nothing, by name, with the reason of each. begun: s that were left out at the beginning of logs,
     by name, as the axis did not yet move freely. looks: how many lengths of the test functions were
     looked at, of which one may show by chance what the others do not. odd: a log that disagrees
-    with the others; a diagnosis is made without it.
+    with the others; a diagnosis is made without it. asked: s, the length that their test functions
+    were made for, each as near to it as its blocks allow; None: that of the first.
     """
 
     axis: str
@@ -54,6 +55,7 @@ class Dataset:
     test: tuple[PreparedLog, ...] = ()
     looks: int = 1
     odd: Disagreement | None = None
+    asked: float | None = None
 
     @property
     def beyond(self) -> dict[str, float]:
@@ -106,14 +108,12 @@ class Dataset:
 
         Raises InputError where the logs have too few samples for it.
         """
-        return replace(
-            self.with_logs(log.at_length(length) for log in self.logs), looks=self.looks + 1
-        )
+        moved = self.with_logs(log.at_length(length) for log in self.logs)
+        return replace(moved, looks=self.looks + 1, asked=length)
 
     def kept_in(self, axis: AxisModel) -> AxisModel:
         """An axis that was found on these logs, with what others need to tell the same errors."""
-        length, delay = self.test_function_length, self.channel_delay
-        return replace(axis, test_function=length, channel_delay=delay)
+        return replace(axis, test_function=self.length, channel_delay=self.channel_delay)
 
     def forget(self) -> None:
         """Let go of what is made of the columns of its logs, where these are held."""
@@ -190,8 +190,13 @@ class Dataset:
 
     @property
     def test_function_length(self) -> float:
-        """Length of the test functions, s."""
+        """Length of the test functions, s, of the first log."""
         return self.training[0].test_function.length
+
+    @property
+    def length(self) -> float:
+        """The length, s, that makes the same test functions of the same logs."""
+        return self.asked or self.test_function_length
 
 
 def _length(log: PreparedLog) -> float:

@@ -132,6 +132,7 @@ def _of_axis(
         test=_within_reach(test, length, fit),
         covered=Covered(tuple(fit), axis.hardware.travel),
         begun=begun,
+        asked=length,
     )
 
 

@@ -36,7 +36,7 @@ def at_another_length(
     showing = [*_showing(ended.found, lengths, catalogue)]
     if not showing:
         return ended
-    length = max(showing, key=lambda judged: judged.fit.ratio).dataset.test_function_length
+    length = max(showing, key=lambda judged: judged.fit.ratio).dataset.length
     asked = within(progress, f"at {1e3 * length:.3g} ms")
     rival = _asked(length, ended.found.base, catalogue, asked)
     return rival if _stands(rival, ended) else ended

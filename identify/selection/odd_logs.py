@@ -51,6 +51,6 @@ def _odd_beside(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
     """The log that disagrees with the others beside all that was found."""
     found = ended.found.dataset
     there = realigned(dataset, found.channel_delay)
-    if found.test_function_length != dataset.test_function_length:
-        there = there.at_length(found.test_function_length)
+    if found.length != dataset.length:
+        there = there.at_length(found.length)
     return odd_in(ended.found.final.fit.axis, there)

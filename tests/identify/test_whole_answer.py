@@ -134,3 +134,17 @@ def test_the_next_command_is_done_once_the_model_is_written(drive: Path, answer:
     assert "next: twin diagnose" not in then
     done = twin("diagnose", "again.toml", *ROLES, folder=drive).stdout
     assert "Missing:" not in done
+
+
+def test_a_model_keeps_the_length_that_its_errors_were_told_at(drive: Path, tmp_path: Path) -> None:
+    """Beside it every command tells them, where the samples of the logs allow that length."""
+    axis = replace(machine(16.0, cogging=COGGING), test_function=0.05)
+    save_model(MachineModel("drive", {"x": axis}, RATE), tmp_path / "kept.toml")
+    kept = load_model(tmp_path / "kept.toml", few("coulomb_viscous", "cogging"))
+    assert kept.axes["x"].test_function == axis.test_function
+    log = read_log(drive / "a.mcap")
+    own, asked = fit(kept, {"a": log}), fit(kept, {"a": log}, test_function=0.05)
+    plain = fit(kept.with_axis("x", replace(axis, test_function=None)), {"a": log})
+    assert own.fits["x"].error == asked.fits["x"].error != plain.fits["x"].error
+    short = replace(kept, axes={"x": replace(axis, test_function=1.0 / RATE)})
+    assert fit(short, {"a": log}).datasets["x"].length > 2.0 / RATE

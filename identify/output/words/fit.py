@@ -201,7 +201,7 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
             f"the {words('force')} is averaged over {quantity(dataset.test_function_length, 's')}: "
             "a length asked besides, as it shows what the one hides that the noise asks for; a "
             "model that is written keeps it, other commands tell the same errors with "
-            f"--test-function {dataset.test_function_length:g}"
+            f"--test-function {dataset.length:g}"
         )
     if dataset.odd:
         said.append(odd_in_words(dataset))
