@@ -174,7 +174,7 @@ def test_the_comparison_of_a_diagnosis_is_of_its_dataset_over_the_floor_of_its_f
 
 def test_the_model_of_a_diagnosis_has_what_was_found_as_it_was_fitted(case):
     made_of_it = case.diagnosis.model
-    assert made_of_it.axes["x"] == case.x.final.axis
+    assert made_of_it.axes["x"] == case.x.dataset.kept_in(case.x.final.axis)
     (step,) = made_of_it.history
     assert (step.action, step.effect) == ("add", "cogging")
     assert (step.fit_error_before, step.fit_error_after) == (case.x.base.error, case.x.final.error)

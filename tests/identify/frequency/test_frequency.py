@@ -19,7 +19,7 @@ from identify.frequency.plant import Banded, loop_of, plant_of
 from identify.frequency.response import Record, response
 from identify.output.as_json import answer_of
 from tests.cli_runs import refusal, twin
-from twin.effects import load_catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log, write_log
@@ -155,6 +155,13 @@ def test_what_cannot_be_told_is_refused_in_one_line() -> None:
 # A joint behind an elastic gear: a rigid fit makes a mass or a delay of it
 
 
+# what would be seen as well in a position that lags behind the force
+LAGGING = Catalogue(
+    [load_catalogue()[name] for name in ("flexible_mode", "backlash", "actuator_lag", "spring",
+     "encoder_delay", "base_vibration", "coulomb_viscous", "quadratic_drag")]
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module", params=[pytest.param(8.0, marks=pytest.mark.slow), 12.0])
 def geared(request: pytest.FixtureRequest) -> tuple[TwoMasses, list[Log]]:
     machine = TwoMasses(
@@ -177,7 +184,8 @@ def test_an_elastic_gear_is_seen_through_and_named(geared: tuple[TwoMasses, list
     (mode,) = plant.modes
     assert mode.frequency.value == pytest.approx(machine.resonance[0], rel=0.01)
     assert plant.mass.value == pytest.approx(machine.mass, rel=0.02)
-    found = identify.diagnose(identify.first_model(logs[0]), *logs).axes["q"]
+    model = identify.first_model(logs[0])
+    found = identify.diagnose(model, *logs, catalogue=LAGGING).axes["q"]
     ((name, *tied),) = found.answers
     assert "flexible_mode" in (name, *tied)
     assert found.missing[0].parameters["frequency"] == pytest.approx(machine.frequency, rel=0.01)

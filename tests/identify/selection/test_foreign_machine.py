@@ -22,6 +22,7 @@ RATE = 4e3  # Hz
 FEW = Catalogue([CATALOGUE[n] for n in ("asymmetric_friction", "cogging", "quadratic_drag")])
 
 
+@pytest.mark.slow  # tests/benchmarks/test_judgement.py diagnoses the same machine
 def test_an_effect_of_the_catalogue_is_named() -> None:
     planted, rng = INSIDE["cogging"], np.random.default_rng(5)
     machine = planted.make(drawn(np.random.default_rng(5), RATE), 0.01, rng)

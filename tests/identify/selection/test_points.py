@@ -153,7 +153,8 @@ def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     """That the noise floor rises is no change of the model: each form had unpacked its findings."""
     one, two, held = (with_hum(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
     model = MachineModel("m", {"x": SLIDE}, RATE)
-    found = identify.diagnose(model, {"one": one, "two": two}, {"held": held})
+    known = few("cogging", "quadratic_drag", "spring")
+    found = identify.diagnose(model, {"one": one, "two": two}, {"held": held}, catalogue=known)
     assert found.axes["x"].verdict is Verdict.NOTHING_MISSING
     assert found.axes["x"].dataset.force_noise > 0.02
     assert "its origin is not known" in str(found)
@@ -274,12 +275,9 @@ BUMPS = having(
 NEAR_BUMPS = ("backlash", "cogging", "flexible_mode", "presliding_hysteresis")
 
 
-@pytest.mark.parametrize("size", [pytest.param(1.0, marks=pytest.mark.slow), 5.0])
-@pytest.mark.parametrize(
-    "names",
-    [NEAR_BUMPS, pytest.param(tuple(CATALOGUE), marks=pytest.mark.slow)],
-    ids=["few", "all"],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1.0, 5.0])
+@pytest.mark.parametrize("names", [NEAR_BUMPS, tuple(CATALOGUE)], ids=["few", "all"])
 def test_bumps_of_another_form_alone_are_no_other_effect(
     size: float, names: tuple[str, ...]
 ) -> None:
