@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from benchmarks.figures import Figure, Target
-from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from identify.dataset.preparation import datasets
+from studies.curves.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from studies.thesis.models import overall
 from studies.thesis.reproduction import reproduce
 from studies.thesis.study import friction_of, machine

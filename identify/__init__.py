@@ -1,6 +1,5 @@
 """The model against measurements: fit, compare, diagnose, add, plan, agree.
 
-And what logs show by themselves: friction by speed and place, its dynamic part, the cable's force.
 Logs are given as a Log, the path of one, a list of them or a dict by name; a model as a
 MachineModel, the path of its file or a name of the package.
 
@@ -21,9 +20,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Addition", "Agreement", "AllAdded", "Comparison", "CorrectedBody", "Diagnosis", "Feedforward",
     "FitResult", "FrequencyResponse", "SimulationFit", "add", "add_found", "add_shape", "agree",
-    "along_track", "cable_force", "compare", "correct_body",
-    "diagnose", "dynamic_friction", "feedforward", "first_model", "fit", "fit_simulation",
-    "frequency_response", "friction_map", "plan", "velocity_map",
+    "compare", "correct_body", "diagnose", "feedforward", "first_model", "fit", "fit_simulation",
+    "frequency_response", "plan",
 ]  # fmt: skip
 
 

@@ -8,14 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from identify.analysis.cable_force import cable_force as cable_force
-from identify.analysis.dynamic_friction import dynamic_friction as dynamic_friction
 from identify.analysis.first_model import Masses, unused
 from identify.analysis.first_model import first_model as shown_by
 from identify.analysis.recording import Recording, misassigned
-from identify.analysis.velocity_map import along_track as along_track
-from identify.analysis.velocity_map import friction_map as friction_map
-from identify.analysis.velocity_map import velocity_map as velocity_map
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import shortness
 from identify.dataset.preparation import datasets, tell_left_out, telling, those_told

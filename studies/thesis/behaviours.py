@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
+from studies.curves.velocity_map import VelocityMap
 from studies.thesis.study import Array, Numbers, followed, seed_of
 from twin.core.loop import Controller
 from twin.experiments.kinds import Staircase

@@ -2,16 +2,15 @@
 
 The thesis averages 10 passes each way, -(F_pos + F_neg)/2, and smooths. Here the spikes of the
 rollers are found first and kept out. The machine is simulated, so that what is found can be held
-against what was planted; ``identify.cable_force`` runs on any log of passes.
+against what was planted; ``studies.curves.cable_force`` runs on any log of passes.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from identify import cable_force
-from identify.analysis.cable_force import CableForce
 from identify.estimation.evidence import rms
+from studies.curves.cable_force import CableForce, cable_force
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

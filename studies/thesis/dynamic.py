@@ -18,7 +18,6 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import minimize
 
-from identify.analysis.dynamic_friction import dynamic_part_free, fit_dynamic_part
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
@@ -26,6 +25,7 @@ from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import force_along
 from identify.estimation.intervals import half_widths
 from identify.estimation.open_loop import Beginning, OpenLoopRun, measured_beginning
+from studies.curves.dynamic_friction import dynamic_part_free, fit_dynamic_part
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
@@ -26,6 +25,7 @@ from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import half_widths
 from identify.output.numbers import spaced
 from identify.selection.nonparametric import fit_nonparametric
+from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

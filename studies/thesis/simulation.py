@@ -14,14 +14,14 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
-from identify.analysis.friction_curve import StribeckCurve, fit_stribeck
-from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
+from studies.curves.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
+from studies.curves.friction_curve import StribeckCurve, fit_stribeck
+from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

@@ -17,13 +17,13 @@ from functools import partial
 
 import numpy as np
 
-from identify.analysis.friction_curve import NAMES, fit_stribeck, stribeck_through
-from identify.analysis.velocity_map import VelocityMap
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import with_band
+from studies.curves.friction_curve import NAMES, fit_stribeck, stribeck_through
+from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study

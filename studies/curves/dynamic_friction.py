@@ -15,12 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.analysis.velocity_map import only_axis
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import MOST_EVALUATIONS, minimise
 from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
+from studies.curves.velocity_map import only_axis
 from twin.effect import Kind
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name

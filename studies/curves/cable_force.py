@@ -21,11 +21,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.analysis.velocity_map import only_axis
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import CONFIDENCE_LEVEL
+from studies.curves.velocity_map import only_axis
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.machine import AxisModel, MachineModel

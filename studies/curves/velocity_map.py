@@ -15,13 +15,13 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from identify.analysis.friction_curve import MapCurve, curve_through
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import total_force
 from identify.dataset.test_function import TestFunction
+from studies.curves.friction_curve import MapCurve, curve_through
 from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.logs import GivenLogs, logs_by_name

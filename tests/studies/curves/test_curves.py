@@ -12,10 +12,18 @@ from machines import CATALOGUE, tracked
 from machines import PROTON as STAGE
 from scipy.special import stdtrit
 
-import identify
-from identify.analysis.cable_force import CableForce, Passes, Spike, find_spikes, pitch_of
-from identify.analysis.dynamic_friction import DYNAMIC, dynamic_part_free
-from identify.analysis.friction_curve import (
+from identify.dataset.motion import motion_of
+from identify.dataset.preparation import datasets
+from studies.curves.cable_force import (
+    CableForce,
+    Passes,
+    Spike,
+    cable_force,
+    find_spikes,
+    pitch_of,
+)
+from studies.curves.dynamic_friction import DYNAMIC, dynamic_friction, dynamic_part_free
+from studies.curves.friction_curve import (
     LINE,
     NAMES,
     StribeckCurve,
@@ -23,9 +31,7 @@ from identify.analysis.friction_curve import (
     fit_stribeck,
     stribeck_through,
 )
-from identify.analysis.velocity_map import VelocityMap
-from identify.dataset.motion import motion_of
-from identify.dataset.preparation import datasets
+from studies.curves.velocity_map import VelocityMap, along_track, friction_map, velocity_map
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments import kinds
@@ -61,17 +67,17 @@ def logs() -> dict[str, Log]:
 
 
 def test_friction_along_the_track_is_read_place_by_place(logs) -> None:
-    found = identify.along_track(ONE, logs)
+    found = along_track(ONE, logs)
     assert [m.position for m in found] == pytest.approx([-0.102, 0.102], abs=1e-3)
     low, high = (m.curves[1.0].values["Fc"] for m in found)
     assert low > 1.05 * high  # as planted: the level falls along the track
     assert [len(m.map) for m in found] == [8, 8]
     with pytest.raises(InputError, match=r"all logs are of one place.*friction_map"):
-        identify.along_track(ONE, dict(list(logs.items())[:2]))
+        along_track(ONE, dict(list(logs.items())[:2]))
 
 
 def test_a_map_has_a_curve_each_way_and_the_mean_of_both(logs) -> None:
-    found = identify.friction_map(ONE, dict(list(logs.items())[:2]), axis="x")
+    found = friction_map(ONE, dict(list(logs.items())[:2]), axis="x")
     ahead, back = (found.curves[way].values for way in (1.0, -1.0))
     assert found.both["Fc"] == pytest.approx(0.5 * (ahead["Fc"] + back["Fc"]))
     assert found.differing == []  # the machine's friction does not know the direction
@@ -81,11 +87,11 @@ def test_a_map_has_a_curve_each_way_and_the_mean_of_both(logs) -> None:
 
 def test_the_axis_must_be_one_that_moves_and_at_constant_speed(logs) -> None:
     with pytest.raises(InputError, match="axis z does not move in the logs; there moves x"):
-        identify.friction_map(ONE, logs, axis="z")
+        friction_map(ONE, logs, axis="z")
     both = tracked(STAGE, 1, 2.0)
     assert len(datasets(STAGE, {"run": both}, {})) == 2
     with pytest.raises(InputError, match="x, y move in the logs; give the axis"):
-        identify.velocity_map(STAGE, {"run": both})
+        velocity_map(STAGE, {"run": both})
     log = simulate(SLIDE, Reversals("x", repeats=8), simulator=ReducedSimulator)
     with pytest.raises(InputError, match="no constant speed"):
         VelocityMap.of(SLIDE.axes["x"], motion_of(log, "x", "log"))
@@ -96,7 +102,7 @@ def test_the_map_of_a_real_drive_shows_its_direction_dependent_viscosity(shared_
     mapping = load_mapping(EXAMPLES / "import_emps.toml")
     log = import_log(shared_data / "emps" / "DATA_EMPS.mat", mapping)
     model = load_model(EXAMPLES / "emps.toml", CATALOGUE)
-    found = identify.friction_map(model, {"run": log})
+    found = friction_map(model, {"run": log})
     assert found.curves[1.0].values == pytest.approx({"Fc": 20.1, "sigma2": 166.7}, rel=0.06)
     assert found.curves[-1.0].values == pytest.approx({"Fc": 20.6, "sigma2": 240.4}, rel=0.06)
     assert "sigma2" in found.differing
@@ -112,7 +118,7 @@ def test_friction_of_a_machine_with_a_cable_lies_on_its_curve() -> None:
     assert np.sign(found.velocity).tolist() == [1.0, -1.0, 1.0, -1.0]
     assert np.abs(found.velocity) == pytest.approx(np.repeat(speeds, 2), rel=1e-3)
     assert found.friction == pytest.approx(CURVE(np.abs(found.velocity)), abs=1.5e-3)
-    whole = identify.velocity_map(SLIDE, {"log": log})
+    whole = velocity_map(SLIDE, {"log": log})
     assert whole.friction.tolist() == found.friction.tolist()
     assert np.all(np.diff(np.abs(found.towards(-1.0).velocity)) > 0.0)
 
@@ -192,7 +198,7 @@ def test_both_are_found_from_a_sine_below_the_break_away() -> None:
     log = simulate(machine, sine, seed=2, simulator=FineSimulator)
     wrong = machine.with_axis("x", quiet.with_effect(replace(LUGRE, values={
         **LUGRE.values, "sigma0": 90.0, "sigma1": 3.0})))  # fmt: skip
-    found = identify.dynamic_friction(wrong, {"sine": log})
+    found = dynamic_friction(wrong, {"sine": log})
     values = found.axis["lugre"].values
     assert values["sigma0"] == pytest.approx(260.0, rel=2e-3)
     assert values["sigma1"] == pytest.approx(0.6, rel=2e-2)
@@ -257,14 +263,14 @@ def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth
 def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
     passes = kinds.Passes("x", span=0.3, speed=0.1, repeats=2)
     log = simulate(STAGE, passes, seed=1, simulator=ReducedSimulator)
-    found = identify.cable_force(STAGE, {"passes": log}, axis="x")
+    found = cable_force(STAGE, {"passes": log}, axis="x")
     assert found.pitch is not None
     assert found.pitch.value == pytest.approx(0.034, abs=1e-4)
     log = tracked(ALONE, 1, 3.0)
     with pytest.raises(InputError, match="two each way"):
-        identify.cable_force(ALONE, {"log": log})
+        cable_force(ALONE, {"log": log})
     apart = {f"{at}": simulate(ALONE, kinds.Staircase("x", speeds=(0.06,) * 2, span=0.01, at=(at,)),
                                seed=k, simulator=ReducedSimulator)
              for k, at in enumerate((0.102, -0.102))}  # fmt: skip
     with pytest.raises(InputError, match="no stretch of the track in common"):
-        identify.cable_force(ALONE, apart)
+        cable_force(ALONE, apart)
