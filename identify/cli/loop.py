@@ -29,7 +29,6 @@ from identify.cli.shared import (
     Test,
     TestFunction,
     app,
-    left_out,
     loaded,
     said_of,
     with_logs,
@@ -37,6 +36,7 @@ from identify.cli.shared import (
 )
 from identify.output.machine import briefly, in_shell
 from twin.errors import InputError
+from twin.telling import heard
 
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
@@ -194,7 +194,7 @@ def _report(
     result, before = done.result, None
     if isinstance(result, workflow.Diagnosis):
         before = result.fitted if result.effect else None
-    with progress_on_stderr() as progress, left_out():  # what says nothing was told already
+    with progress_on_stderr() as progress, heard():  # what says nothing was told already
         known = workflow.on_machine(result.model, Recordings(logs), before, progress=progress)
     write_report(out, Subject.of(result, source, machine=known, findings=done.findings))
 
@@ -349,7 +349,7 @@ def frf(
     if len(models) > 1 or not paths:
         raise InputError(f"{' '.join(logs)}: give logs (.mcap) and one model (.toml) at most")
     machine = loaded(models[0], effects)[0] if models else None
-    with progress_on_stderr() as progress, left_out() as silent:
+    with progress_on_stderr() as progress, heard() as silent:
         recorded = CheckedRecordings(paths)
         result = workflow.frequency_response(recorded, machine, progress=progress)
     if out:

@@ -18,7 +18,6 @@ from identify.cli.shared import (
     ModelOption,
     Recordings,
     app,
-    left_out,
     loaded,
     was_kept,
     written,
@@ -26,6 +25,7 @@ from identify.cli.shared import (
 from identify.output.machine import briefly, in_shell
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
+from twin.telling import heard
 
 if TYPE_CHECKING:
     from identify.analysis.first_model import Masses
@@ -395,7 +395,7 @@ def view(
             raise InputError(f"{option} {value:g}: must be above 0, without unit; 1 is as it was")
     machine = None if model is None else loaded(model, effects)[0]
     files = {"html": html, "video": video, "rerun": rerun}
-    with progress_on_stderr() as progress, left_out() as silent:
+    with progress_on_stderr() as progress, heard() as silent:
         progress("reading and replaying the log", 0, 1)
         from identify.view.replay import replay
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from typer import Argument, Option
 from identify.cli.command import Commands, Said, progress_on_stderr
 from identify.output.machine import briefly
 from twin.errors import InputError
+from twin.telling import heard
 
 if TYPE_CHECKING:
     from twin.effects import Catalogue
@@ -214,23 +214,9 @@ def with_logs(
     meaningless = {"UNIT", "SWAPPED", "WRAPPED"} | (set() if model.joints else {"SIGN"})
     recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
-    with progress_on_stderr() as progress, left_out() as silent, recorded.explaining():
+    with progress_on_stderr() as progress, heard() as silent, recorded.explaining():
         result = job(model, recorded, *rest, progress=progress)
     return Done(result, recorded.findings, list(dict.fromkeys(silent)))  # of all axes alike
-
-
-@contextmanager
-def left_out() -> Iterator[list[str]]:
-    """The lines that are said meanwhile of logs that say nothing, instead of on standard error."""
-    lines: list[str] = []
-    handler = logging.Handler()
-    handler.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
-    logger = logging.getLogger("identify")
-    logger.addHandler(handler)
-    try:
-        yield lines
-    finally:
-        logger.removeHandler(handler)
 
 
 def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Said:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import combinations
 
@@ -16,11 +15,10 @@ from twin.errors import InputError
 from twin.logs import LINEAR_UNITS, Log
 from twin.model.machine import AxisModel
 from twin.signals import Array
+from twin.telling import tell
 
 Given = Mapping[Role, Mapping[str, Log]]  # logs by name
 
-
-LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 READ_IF_LOGGED = ("velocity", "setpoint_position")
 
 
@@ -47,7 +45,7 @@ def apart(given: Given) -> tuple[Given, dict[str, str]]:
         if copy.is_complete:
             left_out[copy.copy] = f"it is {copy}, and would count twice"
         else:
-            LOGGER.warning("%s: is %s, which counts twice; cut it off", copy.copy, copy)
+            tell(f"{copy.copy}: is {copy}, which counts twice; cut it off")
     kept = {
         role: {name: log for name, log in logs.items() if name not in left_out}
         for role, logs in given.items()

@@ -5,7 +5,6 @@ Logs that say nothing of a model are left out, and which and why is told.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -35,12 +34,11 @@ from twin.errors import InputError
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import spread
+from twin.telling import tell
 from twin.threads import trim_memory
 
 TURN = 2.0 * np.pi  # rad
 LONGER = "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
-
-LOGGER = logging.getLogger("identify")  # by itself it writes its lines on standard error
 
 
 def datasets(
@@ -235,7 +233,7 @@ def telling(dataset: Dataset, sticks: bool, parameters: int = 0) -> Dataset:
 def tell_left_out(logs: Mapping[str, str]) -> None:
     """Say which logs are left out, and why, a line each; logs: the reasons by name."""
     for name, why in logs.items():
-        LOGGER.warning("%s is left out: %s", name, why)
+        tell(f"{name} is left out: {why}")
 
 
 def those_told(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:

@@ -7,7 +7,6 @@ wrong force of the model.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,8 +28,8 @@ from twin.errors import CannotRun
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_cubic
 from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
+from twin.telling import tell
 
-LOGGER = logging.getLogger("identify")
 HORIZON = 0.5  # s between restarts
 
 
@@ -167,4 +166,4 @@ def left_out_if_it_cannot_run(name: str) -> Iterator[None]:
     try:
         yield
     except CannotRun as error:
-        LOGGER.warning("no free run on %s: %s", name, error)
+        tell(f"no free run on {name}: {error}")

@@ -1,0 +1,50 @@
+"""Jobs at once in one process: the numbers of each are its own, and so is what it says."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+from planted_logs import RATE, SLIDE, Ride, few, having, logged
+
+from identify import workflow
+from identify.output.as_json import json_of
+from twin.logs import Log
+from twin.model.machine import MachineModel
+from twin.telling import heard, tell
+
+MODEL = MachineModel("slide", {"x": SLIDE}, RATE)
+TRUE = having(SLIDE, "cogging", p=0.021, a1=0.9, b1=0.5)
+KNOWN = few("cogging", "spring", "quadratic_drag")
+LOGS = {name: logged(TRUE, Ride(seed)) for seed, name in enumerate("abc", start=1)}
+
+
+def diagnosed(copy: str) -> tuple[dict, list[str]]:
+    """A diagnosis of logs of which one is a copy, and what was said of that."""
+    logs: dict[str, Log] = {"a": LOGS["a"], "b": LOGS["b"], copy: LOGS["a"]}
+    with heard() as said:
+        found = workflow.diagnose(MODEL, logs, {"c": LOGS["c"]}, catalogue=KNOWN)
+    return json_of(found), said
+
+
+def test_two_diagnoses_at_once_are_those_of_one_after_the_other():
+    names = ("again", "once more")
+    alone = [diagnosed(name) for name in names]
+    with ThreadPoolExecutor(2) as pool:
+        assert [*pool.map(diagnosed, names)] == alone
+    for name, (_, said) in zip(names, alone, strict=True):
+        assert [line.split(" is left out")[0] for line in said] == [name]
+
+
+def test_what_a_job_says_is_heard_by_it_alone():
+    both = Barrier(2, timeout=10.0)
+
+    def job(line: str) -> list[str]:
+        with heard() as said:
+            both.wait()
+            tell(line)
+            both.wait()
+        return said
+
+    with ThreadPoolExecutor(2) as pool:
+        assert [*pool.map(job, ("one", "two"))] == [["one"], ["two"]]
