@@ -26,17 +26,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The calls, loaded with the first of them: `twin --help` needs none.
-
-    Each with one BLAS thread, as NumPy has been loaded already by the script that calls it.
-    """
+    """The calls, loaded with the first of them: `twin --help` needs none."""
     if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     from identify import adding, workflow
-    from twin.threads import one_for_matrices
 
-    found = getattr(adding if hasattr(adding, name) else workflow, name)
-    return found if isinstance(found, type) else one_for_matrices(found)
+    return getattr(adding if hasattr(adding, name) else workflow, name)
 
 
 def __dir__() -> list[str]:

@@ -63,6 +63,7 @@ Model = MachineModel | str | Path
 READING = "reading and preparing the logs"
 
 
+@parallel()
 def first_model(
     logs: GivenLogs,
     name: str = "machine",
@@ -335,6 +336,7 @@ def feedforward(
     return Feedforward(model, before, tuple(moved), found)
 
 
+@parallel()
 def frequency_response(
     logs: GivenLogs,
     model: Model | None = None,

@@ -6,6 +6,7 @@ The compiled laws, FFTs and linear algebra release Python's lock.
 from __future__ import annotations
 
 import itertools
+import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
@@ -13,6 +14,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from threading import Lock
 from typing import Literal, TypeVar
+
+from twin.threads import one_for_matrices
 
 Progress = Callable[[str, int, int], None]  # what is being done, how much of it, of how much
 
@@ -38,18 +41,23 @@ _POOL: ContextVar[ThreadPoolExecutor | Literal["in a job"] | None] = ContextVar(
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Cores that this process may use; one in a worker of a pool, which shares them out itself."""
+    if multiprocessing.parent_process() is not None:
+        return 1
     known = hasattr(os, "sched_getaffinity")
     return len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
 
 
 @contextmanager
 def parallel(count: int | None = None) -> Iterator[None]:
-    """Let ``spread`` use that many threads, one a core where None; the outermost decides."""
+    """Let ``spread`` use that many threads, one a core where None; the outermost decides.
+
+    Matrices get one thread meanwhile.
+    """
     if _POOL.get() is not None:
         yield
         return
-    with ThreadPoolExecutor(cores() if count is None else count) as pool:
+    with one_for_matrices(), ThreadPoolExecutor(cores() if count is None else count) as pool:
         token = _POOL.set(pool)
         try:
             yield

@@ -5,13 +5,15 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from functools import wraps
+from contextlib import (
+    AbstractContextManager,
+    ExitStack,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
 from threading import Lock
-from typing import Any, ParamSpec, TypeVar
-
-P = ParamSpec("P")
-R = TypeVar("R")
+from typing import Any
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -43,21 +45,15 @@ def entered_once(
     return counted
 
 
-def one_for_matrices(job: Callable[P, R]) -> Callable[P, R]:
-    """The job with one BLAS thread while it runs, unless the environment says how many.
+@contextmanager
+def one_for_matrices() -> Iterator[None]:
+    """One BLAS thread for what runs within, unless the environment says how many.
 
     The matrices of a fit are too small to share out, and BLAS threads that wait for work cost CPU
     time, and take it from the candidates that go side by side.
     """
-
-    @wraps(job)
-    def limited(*arguments: P.args, **options: P.kwargs) -> R:
-        if any(name in os.environ for name in VARIABLES):
-            return job(*arguments, **options)
-        with _one_blas_thread():
-            return job(*arguments, **options)
-
-    return limited
+    with nullcontext() if any(name in os.environ for name in VARIABLES) else _one_blas_thread():
+        yield
 
 
 @entered_once

@@ -75,7 +75,7 @@ def _section(name: str, found: Found) -> Section:
     return Section(name, title, [answer, *found.pictures, *tables(plain(found.numbers), name)])
 
 
-@one_for_matrices
+@one_for_matrices()
 def reproduce(
     chapters: Sequence[str] = (),
     *,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from threading import Barrier
 
 from planted_logs import RATE, SLIDE, Ride, few, having, logged
@@ -11,6 +12,7 @@ from identify import workflow
 from identify.output.as_json import json_of
 from twin.logs import Log
 from twin.model.machine import MachineModel
+from twin.parallel import cores
 from twin.telling import heard, tell
 
 MODEL = MachineModel("slide", {"x": SLIDE}, RATE)
@@ -48,3 +50,12 @@ def test_what_a_job_says_is_heard_by_it_alone():
 
     with ThreadPoolExecutor(2) as pool:
         assert [*pool.map(job, ("one", "two"))] == [["one"], ["two"]]
+
+
+def cores_of_a_worker(_: int) -> int:
+    return cores()
+
+
+def test_a_worker_of_a_pool_spreads_nothing_as_the_pool_has_the_cores():
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        assert [*pool.map(cores_of_a_worker, [1])] == [1]

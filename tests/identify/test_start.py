@@ -99,22 +99,22 @@ def unsaid(monkeypatch) -> pytest.MonkeyPatch:
 
 def test_a_call_from_python_has_one_thread_for_matrices_and_leaves_them(unsaid) -> None:
     with threadpool_limits(2, user_api="blas"):
-        assert one_for_matrices(blas_threads)() == {1}
+        assert one_for_matrices()(blas_threads)() == {1}
         assert blas_threads() == {2}
         unsaid.setenv(VARIABLES[0], "2")
-        assert one_for_matrices(blas_threads)() == {2}
+        assert one_for_matrices()(blas_threads)() == {2}
 
 
 @pytest.mark.usefixtures("unsaid")
 def test_calls_that_overlap_have_one_thread_for_matrices_and_leave_them() -> None:
     begun, joined, over = Event(), Event(), Event()
 
-    @one_for_matrices
+    @one_for_matrices()
     def first() -> None:
         begun.set()
         assert joined.wait(timeout=10.0)
 
-    @one_for_matrices
+    @one_for_matrices()
     def second() -> set[int]:
         joined.set()
         assert over.wait(timeout=10.0)
