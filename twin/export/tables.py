@@ -7,7 +7,7 @@ makes in the model less the one that it makes in the tables.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -188,83 +188,116 @@ def fewest_points(speeds: Array, force: Array, count: int) -> tuple[Array, float
     return np.unique(kept), float(best[n - 1])
 
 
+NOTHING = Held((), (), ())
+
+
 @dataclass(frozen=True)
-class HeldAxis(Held):
-    """The tables of one axis, and what becomes of its effects in them."""
+class TableFormat:
+    """A format that holds an axis as tables: what it holds of them is what it reads back."""
 
-    tables: AxisTables
+    write: Callable[[str, AxisModel, AxisTables, Held], Mapping[str, str]]
+    """Files of an axis by its name as one of a program, itself, its tables and what is said."""
+    read: Callable[[Mapping[str, str], str, AxisModel], AxisTables]
+    """The tables that such files hold, of the axis of that name; zero for what is not in them."""
+
+    def held(self, name: str, axis: AxisModel, given: AxisTables) -> AxisTables:
+        """What its files hold of tables."""
+        return self.read(self.write(name, axis, given, NOTHING), name, axis)
+
+    def exported(self, model: MachineModel, logs: Mapping[str, Log]) -> Exported:
+        """The files of each axis, and by effect what they lose on the logs."""
+        given, axes = motions(model, logs), {}
+        files: dict[str, str | bytes] = {}
+        for axis, name in axis_identifiers(model).items():
+            judged = _Judged(self, model, axis, name, given)
+            axes[axis] = held = judged.held
+            files.update(self.write(name, model.axes[axis], judged.tables(model.axes[axis]), held))
+        return Exported(files, axes)
 
 
-Made = Callable[[AxisTables], AxisTables]
-"""What a format makes of the tables of an axis."""
+@dataclass(frozen=True)
+class _Judged:
+    """One axis, whose files are read back to tell what they lose on motions."""
 
+    format: TableFormat
+    model: MachineModel
+    axis: str
+    name: str
+    given: list[SetpointMotion]
 
-def judged_axes(model: MachineModel, logs: Mapping[str, Log], made: Made) -> dict[str, HeldAxis]:
-    """The tables that a format makes of each axis, and by effect what they lose on the logs."""
-    given = motions(model, logs)
-    return {name: _judged(model, name, given, made) for name in model.axes}
+    def tables(self, of: AxisModel) -> AxisTables:
+        """Of the axis with other effects."""
+        own = self.model.axes[self.axis]
+        ends = np.concatenate([m.setpoints[self.axis][0] for m in self.given])
+        reach = own.hardware.travel or (float(ends.min()), float(ends.max()))
+        if not reach[0] < reach[1]:
+            raise InputError(
+                f"axis {self.axis}: stands still in {self._where}, and the model has no travel, so "
+                f"that no table over its {own.units.words('position')} can be made; give the model "
+                "its travel, or a log in which the axis moves"
+            )
+        fastest = [float(np.abs(m.setpoints[self.axis][1]).max()) for m in self.given]
+        return tables(of, reach, max(*fastest, own.hardware.velocity))
 
+    @property
+    def _where(self) -> str:
+        return ", ".join(m.name for m in self.given)
 
-def exported(
-    model: MachineModel,
-    found: Mapping[str, HeldAxis],
-    files_of: Callable[[str, AxisModel, HeldAxis], Mapping[str, str]],
-) -> Exported:
-    """The files of each axis, made of its name as one of a program, itself and its tables."""
-    names = axis_identifiers(model)
-    made = (files_of(names[name], axis, found[name]) for name, axis in model.axes.items())
-    return Exported({file: text for files in made for file, text in files.items()}, found)
+    @property
+    def _moving(self) -> Array:
+        """(3, n) of the axis while it moves in all motions."""
+        own = np.concatenate([m.setpoints[self.axis] for m in self.given], axis=1)
+        return own[:, own[1] != 0.0]
+
+    def _both(self, of: AxisModel) -> Array:
+        """Force (2, n) N of an axis while it moves in all motions: in the model, in the files."""
+        others = [a for a in self.model.axes if a != self.axis]
+        forces = []
+        for m in self.given:
+            own = m.setpoints[self.axis]
+            beside = m.setpoints[others[0]] if len(others) == 1 else np.zeros_like(own)
+            forces.append(feedforward(of, own, beside, m.period)[own[1] != 0.0])
+        held = self.format.held(self.name, of, self.tables(of))
+        return np.stack([np.concatenate(forces), held.force(self._moving)])
+
+    def _losses(self) -> Iterator[tuple[str, Loss]]:
+        """What is lost of the mass, and of each effect that a feedforward follows."""
+        axis = self.model.axes[self.axis]
+        held = self.format.held(self.name, axis, self.tables(axis)).mass
+        moved = self._moving[2]
+        whole = axis.weighed.mass
+        yield axis.units.mass_name, Loss(_size(whole * moved), _size((whole - held) * moved))
+        total = self._both(axis)
+        for effect in followed(axis).axis.names:
+            own, in_files = total - self._both(axis.without(effect))
+            yield effect, Loss(_size(own), _size(own - in_files))
+
+    @property
+    def held(self) -> Held:
+        """What the files hold of the axis as the model does, what nearly, and what not."""
+        axis, found = self.model.axes[self.axis], followed(self.model.axes[self.axis])
+        units, kept = axis.units, []
+        told = {e: (True, why) for e, why in found.lost.items()}
+        told |= {e: (False, why) for e, why in found.approximated.items() if e not in told}
+        for part, loss in self._losses():
+            told.pop(part, None)
+            # A mass that moves at an even speed asks for no force, and is no less in the file.
+            if loss.is_negligible and (loss.size or part == units.mass_name):
+                kept.append(part)
+            elif loss.size:
+                told[part] = loss.is_most, loss.on(self._where, units.force)
+            else:
+                force = units.words("force")
+                text = f"it makes no {force} on {self._where}, so its loss is not known"
+                told[part] = False, text
+        parts = [p for p in (units.mass_name, *axis.names) if p in told]
+        nearly, lost = (
+            tuple(Remark(self.axis, p, told[p][1]) for p in parts if told[p][0] is gone)
+            for gone in (False, True)
+        )
+        return Held(tuple(kept), nearly, lost)
 
 
 def _size(force: Array) -> float:
     """RMS of a force (n,) N; 0 where the axis does not move at all."""
     return float(np.sqrt(np.mean(force**2))) if len(force) else 0.0
-
-
-def _judged(model: MachineModel, name: str, given: list[SetpointMotion], made: Made) -> HeldAxis:
-    axis, others = model.axes[name], [a for a in model.axes if a != name]
-    ends = np.concatenate([m.setpoints[name][0] for m in given])
-    reach = axis.hardware.travel or (float(ends.min()), float(ends.max()))
-    if not reach[0] < reach[1]:
-        raise InputError(
-            f"axis {name}: stands still in {', '.join(m.name for m in given)}, and the model has "
-            f"no travel, so that no table over its {axis.units.words('position')} can be made; "
-            "give the model its travel, or a log in which the axis moves"
-        )
-    speed = max(*(np.abs(m.setpoints[name][1]).max() for m in given), axis.hardware.velocity)
-
-    def tabled(of: AxisModel) -> AxisTables:
-        return made(tables(of, reach, speed))
-
-    def both(of: AxisModel, its: AxisTables) -> Array:
-        """Force of the model and of the tables while the axis moves in all motions, (2, n) N."""
-        forces = []
-        for m in given:
-            own = m.setpoints[name]
-            beside = m.setpoints[others[0]] if len(others) == 1 else np.zeros_like(own)
-            whole = feedforward(of, own, beside, m.period)
-            forces.append(np.stack([whole, its.force(own)])[:, own[1] != 0.0])
-        return np.concatenate(forces, axis=1)
-
-    whole, units = tabled(axis), axis.units
-    total, unit = both(axis, whole), units.force
-    found, where = followed(axis), ", ".join(m.name for m in given)
-    kept = [units.mass_name]
-    remarks: dict[bool, list[Remark]] = {False: [], True: []}  # lost: whether more than half
-    for effect in axis.names:
-        lost = effect in found.lost
-        if effect in found.axis.names:
-            less = axis.without(effect)
-            own, in_tables = total - both(less, tabled(less))
-            loss = Loss(*(_size(force) for force in (own, own - in_tables)))
-            if loss.is_negligible and loss.size:
-                kept.append(effect)
-                continue
-            lost = loss.is_most and loss.size > 0.0
-            text = loss.on(where, unit)
-            if not loss.size:
-                text = f"it makes no {units.words('force')} on {where}, so its loss is not known"
-        else:
-            text = (found.lost if lost else found.approximated)[effect]
-        remarks[lost].append(Remark(name, effect, text))
-    return HeldAxis(tuple(kept), tuple(remarks[False]), tuple(remarks[True]), whole)

@@ -15,8 +15,9 @@ from strict_json import valid
 
 from identify.testing import assert_exported
 from twin.errors import InputError
-from twin.export import find_exporter
-from twin.export.tables import fewest_points, motions, tables
+from twin.export import Held, find_exporter
+from twin.export.formats import csv
+from twin.export.tables import AxisTables, TableFormat, fewest_points, motions, tables
 from twin.feedforward import feedforward
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
@@ -84,12 +85,13 @@ def test_twincat_has_twenty_points_and_says_in_newtons_what_it_has_no_place_for(
     out = [float(entries[f"frict_comp.table[{i}].out"]) for i in range(count)]
     assert np.interp(0.1e6, speeds, out) == pytest.approx(35.0, rel=0.02)
     lost = {r.part: r.text for r in made.lost}
-    assert {"cable_slab", "constant_force", *(f.effect.name for f in UNEVEN)} == set(lost)
+    beyond = {"mass", "payload_mass", "cable_slab", "constant_force"}
+    assert beyond | {f.effect.name for f in UNEVEN} == set(lost)
     assert lost["constant_force"] == "0.2 of its 0.2 N RMS are lost on simulated moves"
     uneven = lost["asymmetric_friction"].split(" of its ")
     assert float(uneven[0]) == pytest.approx(0.2 * 0.5, rel=0.1)
     assert uneven[1].startswith(f"{uneven[0]} N RMS")
-    assert {"mass", "cogging", "payload_mass"} == set(made.kept["x"])
+    assert made.kept["x"] == ("cogging",)
     # what the other two make of the friction is lost of it, too
     assert "coulomb_viscous" in {r.part for r in made.approximated}
     assert len(csv_columns(made.files["x_cogging.csv"])["current (A)"]) == 256
@@ -160,7 +162,25 @@ def test_ros2_control_has_the_limits_and_a_straight_friction() -> None:
     for line in ("joint_limits:", "x:", "max_position: 0.1", "max_velocity: 0.2", "max_jerk: 50.0",
                  "has_effort_limits: false"):  # fmt: skip
         assert line in limits
-    assert {"cogging", "cable_slab", "asymmetric_friction"} <= {r.part for r in made.lost}
+    assert {"mass", "cogging", "cable_slab"} <= {r.part for r in made.lost}
+
+
+@pytest.mark.parametrize("left_out", ["mass", "position", "cogging"])
+def test_what_a_file_lacks_is_not_told_to_be_kept(left_out: str) -> None:
+    """What is kept is judged on the files, which are read back, not on what was to be in them."""
+
+    def write(name: str, axis: AxisModel, of: AxisTables, said: Held) -> dict[str, str]:
+        files = csv.write(name, axis, of, said)
+        file = f"{name}_{left_out}.csv"
+        if file in files:
+            head, *rows = files[file].splitlines()
+            empty = [",".join([*row.split(",")[:-1], "0"]) for row in rows]
+            files[file] = "\n".join([head, *empty])
+        return files
+
+    made = TableFormat(write, csv.read).exported(slide(*PLAIN), {})
+    parts = {"mass": {"mass", "payload_mass"}, "cogging": {"cogging"}}
+    assert {r.part for r in made.lost} == parts.get(left_out, {"constant_force", "cable_slab"})
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twin.export import Exported, Exporter
-from twin.export.tables import HeldAxis, exported, judged_axes
-from twin.logs import Log
-from twin.model.machine import AxisModel, MachineModel
+from twin.export import Exporter, Held
+from twin.export.tables import AxisTables, Periodic, TableFormat
+from twin.model.machine import AxisModel
 from twin.signals import Array
 
 
-def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
-    """A file for each table of each axis."""
-    return exported(model, judged_axes(model, logs, lambda tables: tables), _files)
-
-
-def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
-    units, of = axis.units, found.tables
+def write(name: str, axis: AxisModel, of: AxisTables, said: Held) -> dict[str, str]:
+    """A file for each table of an axis."""
+    units = axis.units
     force, position = f"{units.words('force')} ({units.force})", f"({units.position})"
     place = f"{units.words('position')} {position}"
     mass = f"{units.mass_name} ({units.mass})"
@@ -45,10 +40,34 @@ def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
     return files
 
 
+def read(files: Mapping[str, str], name: str, axis: AxisModel) -> AxisTables:
+    """The tables of the files of an axis."""
+    (mass,) = csv_columns(files[f"{name}_{axis.units.mass_name}.csv"]).values()
+    positions, along = csv_columns(files[f"{name}_position.csv"]).values()
+    speeds, forwards, backwards = csv_columns(files[f"{name}_speed.csv"]).values()
+    periodic = []
+    for effect in axis.names:
+        if text := files.get(f"{name}_{effect}.csv"):
+            places, force = csv_columns(text).values()
+            periodic.append(Periodic(effect, len(places) * float(places[1]), force))
+    return AxisTables(
+        float(mass[0]), positions, along, speeds, forwards, backwards, tuple(periodic)
+    )
+
+
 def csv_text(columns: Mapping[str, Array]) -> str:
     """Columns of equal length with their names, which hold no comma."""
     rows = zip(*columns.values(), strict=True)
     return "\n".join([",".join(columns), *(",".join(f"{v:.9g}" for v in r) for r in rows)]) + "\n"
 
 
-EXPORTER = Exporter("tables over position, speed and phase of a pitch", export, ".csv")
+def csv_columns(text: str) -> dict[str, Array]:
+    """The columns (n,) of such a text by name."""
+    head, *rows = text.splitlines()
+    columns = np.loadtxt(rows, delimiter=",", ndmin=2).T
+    return dict(zip(head.split(","), columns, strict=True))
+
+
+EXPORTER = Exporter(
+    "tables over position, speed and phase of a pitch", TableFormat(write, read).exported, ".csv"
+)

@@ -1,56 +1,55 @@
 """TwinCAT CNC: the friction compensation of a compensation value list, and cogging as tables.
 
 frict_comp.table adds a current by the size of the commanded speed, with its sign: at most 20 points
-from speed 0 upwards (Beckhoff, TF5200, P-COMP-00041 to 00062).
+from speed 0 upwards (Beckhoff, TF5200, P-COMP-00041 to 00062). It has no place for a mass, which a
+comment tells for the acceleration feedforward.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from math import degrees
 
 import numpy as np
 
-from twin.export import Exported, Exporter, Remark, filled
-from twin.export.formats.csv import csv_text
-from twin.export.tables import ENTRIES, AxisTables, HeldAxis, exported, fewest_points, judged_axes
+from twin.export import Exported, Exporter, Held, Remark, axis_identifiers, filled
+from twin.export.formats.csv import csv_columns, csv_text
+from twin.export.tables import ENTRIES, AxisTables, Periodic, TableFormat, fewest_points
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
+from twin.signals import Array
+
+MOST = 20  # points of a table, P-COMP-00062, as it is delivered
 
 
 def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     """For each axis a compensation value list, and a file for each effect that repeats."""
-    found, axes = judged_axes(model, logs, _held), {}
-    for name, own in found.items():
-        points = Remark(name, "friction table", _points(model.axes[name], own.tables))
-        axes[name] = replace(own, approximated=(points, *own.approximated))
-    return replace(exported(model, found, _files), axes=axes)
+    made, axes = FORMAT.exported(model, logs), {}
+    for axis, name in axis_identifiers(model).items():
+        files, own = {file: str(text) for file, text in made.files.items()}, model.axes[axis]
+        points = Remark(axis, "friction table", _points(own, read(files, name, own).speeds))
+        axes[axis] = replace(made.axes[axis], approximated=(points, *made.axes[axis].approximated))
+    return replace(made, axes=axes)
 
 
-def _held(of: AxisTables) -> AxisTables:
-    """What TwinCAT has a place for: a speed table that turns with the direction, and cogging."""
-    chosen, _ = fewest_points(of.speeds, of.odd, 20)  # P-COMP-00062, as it is delivered
-    still, speeds, odd = np.zeros_like(of.along), of.speeds[chosen], of.odd[chosen]
-    return replace(of, along=still, speeds=speeds, forwards=odd, backwards=-odd)
+def _points(axis: AxisModel, speeds: Array) -> str:
+    return f"{len(speeds)} points from 0 to {speeds[-1]:.3g} {axis.units.velocity}"
 
 
-def _points(axis: AxisModel, of: AxisTables) -> str:
-    return f"{len(of.speeds)} points from 0 to {of.speeds[-1]:.3g} {axis.units.velocity}"
-
-
-def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
-    units, of = axis.units, found.tables
-    constant = axis.hardware.force_constant
+def write(name: str, axis: AxisModel, of: AxisTables, said: Held) -> dict[str, str]:
+    """A speed table that turns with the direction, and a file for each effect that repeats."""
+    units, constant = axis.units, axis.hardware.force_constant
     known = constant != 1.0
     current = f"mA, {units.words('force')} over {constant:g} {units('N/A')}"
     force = f"0.001 {units.force}: the model has no force constant"
-    speeds = np.degrees(of.speeds) * 1e3 if axis.rotary else of.speeds * 1e6
-    needed = 1e3 * of.forwards / constant
+    chosen, _ = fewest_points(of.speeds, of.odd, MOST)
+    speeds, needed = of.speeds[chosen] * _per_speed(axis), 1e3 * of.odd[chosen] / constant
     entries = [(round(float(v)), round(f, 3)) for v, f in zip(speeds, needed, strict=True)]
     listed = filled(
-        "friction.lis", name=name, axis=axis, found=found, points=_points(axis, of), mass=of.mass,
-        unit=current if known else force, entries=entries,
+        "friction.lis", name=name, axis=axis, found=said, points=_points(axis, of.speeds[chosen]),
+        mass=of.mass, unit=current if known else force, entries=entries,
     )  # fmt: skip
     files = {f"{name}_friction.lis": listed}
     for p in of.periodic:
@@ -66,4 +65,31 @@ def _files(name: str, axis: AxisModel, found: HeldAxis) -> dict[str, str]:
     return files
 
 
+def _per_speed(axis: AxisModel) -> float:
+    """The unit of a speed of the list, um/s or 0.001 degrees/s, in those of the model."""
+    return degrees(1e3) if axis.rotary else 1e6
+
+
+def read(files: Mapping[str, str], name: str, axis: AxisModel) -> AxisTables:
+    """The tables of the files of an axis; what the controller passes over is zero."""
+    pairs = re.findall(
+        r"^frict_comp\.table\[\d+\]\.(in|out) +(\S+)", files[f"{name}_friction.lis"], re.M
+    )
+    speeds, needed = (np.array([float(v) for k, v in pairs if k == what]) for what in ("in", "out"))
+    constant = axis.hardware.force_constant
+    odd = 1e-3 * constant * needed
+    periodic = []
+    for effect in axis.names:
+        if text := files.get(f"{name}_{effect}.csv"):
+            head = text.splitlines()[0]
+            _, current = csv_columns(text).values()
+            period = float(head.split("360 are ")[1].split()[0])
+            periodic.append(Periodic(effect, period, constant * current))
+    still = np.zeros(2)
+    return AxisTables(
+        0.0, np.arange(2.0), still, speeds / _per_speed(axis), odd, -odd, tuple(periodic)
+    )
+
+
+FORMAT = TableFormat(write, read)
 EXPORTER = Exporter("friction compensation table of TwinCAT CNC, cogging as tables", export, ".lis")
