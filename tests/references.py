@@ -159,6 +159,12 @@ def gravity(p: Values, q: Columns) -> Results:
     return {OUT: -np.imag((p["sine"] + 1j * p["cosine"]) * np.exp(1j * q.x))}
 
 
+@written_from("F = -(sine sin(q/gear) + cosine cos(q/gear))")
+def unbalance(p: Values, q: Columns) -> Results:
+    """The same behind a gear."""
+    return {OUT: -np.imag((p["sine"] + 1j * p["cosine"]) * np.exp(1j * q.x / p["gear"]))}
+
+
 @written_from("F = sum_{k=1..3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)")
 def cogging(p: Values, q: Columns) -> Results:
     return {OUT: fourier(p, q.x / p["p"])}

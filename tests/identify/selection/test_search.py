@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from built_fits import built, built_fit, tried
 from machines import CATALOGUE, PROTON, tracked
-from planted_logs import SLIDE, Ride, asked, few, having
+from planted_logs import SLIDE, Ride, asked, begun, few, having
 
 from identify import diagnose
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.estimation.variable_projection import absent_effects
-from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import FindingKind
 from identify.selection.search import Step, simplest
 from identify.selection.trying import try_effect
@@ -204,10 +204,17 @@ JOINT = Hardware(
     travel=(-1.7, 1.7), encoder_noise=1e-8, current_noise=2e-4, velocity=2.5, acceleration=20.0,
     jerk=1000.0,
 )  # fmt: skip
+MOTOR = replace(JOINT, travel=(-40.0, 40.0), velocity=50.0, acceleration=400.0, jerk=2e4)
 SLIDES = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.3, "Fs": 0.3, "sigma2": 0.5})
 FREE = AxisModel(15.0, STAGE)
 RUBS = AxisModel(15.0, STAGE, (SLIDES,))
 TURNS = AxisModel(0.4, JOINT, (SLIDES,), rotary=True)
+DRIVES = AxisModel(
+    0.01,
+    MOTOR,
+    (Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 0.3, "Fs": 0.3}),),
+    rotary=True,
+)
 PLANTED = {
     "viscous_friction": (FREE, {"c": 1.7}),
     "spring": (RUBS, {"middle": 0.0, "offset": 0.3, "k1": 4.0, "k2": -9.0, "k3": 150.0}),
@@ -230,3 +237,24 @@ def test_a_law_of_any_machine_is_found_with_its_values(name: str) -> None:
     assert found.fit.ratio < 1.5 < base.ratio
     for key, value in values.items():
         assert found.fit.axis[name].values[key] == pytest.approx(value, rel=0.05, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("unbalance", {"gear": 7.0, "sine": 0.9, "cosine": -0.4}),
+        ("spring", {"offset": 0.1, "k1": 0.02, "k3": 2e-5}),
+        ("cogging", {"p": 0.9, "a1": 0.2, "b1": 0.1}),
+    ],
+)
+def test_a_load_that_turns_behind_a_gear_is_told_from_a_spring_and_from_cogging(
+    name: str, values: dict[str, float]
+) -> None:
+    law = Fitted.at_start(CATALOGUE[name], values)
+    true = MachineModel("m", {"x": DRIVES.with_effect(law)}, 1000.0)
+    logs = [{f"{seed}": tracked(true, seed, 6.0)} for seed in (1, 2)]
+    known = few("unbalance", "spring", "cogging", "gravity", "constant_force")
+    found = diagnose_axis(*begun(DRIVES, *logs), known)
+    assert found.named == (name,)
+    if name == "unbalance":
+        assert found.final.axis[name].values == pytest.approx(values, rel=0.02)

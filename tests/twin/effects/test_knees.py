@@ -16,6 +16,13 @@ SEEN = Excitation(
     fewest_cycles=2.5, resolution=2e-6, other_joints=(1.0, 2.0),
 )  # fmt: skip
 TRAVEL = SEEN.travel
+TURNING = replace(SEEN, position_low=-40.0, position_high=40.0)  # rad
+
+
+def seen_by(name: str) -> Excitation:
+    """A motion that shows the law: of a shaft several turns."""
+    return TURNING if name == "unbalance" else SEEN
+
 
 RIPPLE = [(2.0 * SEEN.resolution, Imitated.ROUNDING), (1e-9, Imitated.ROUNDING), (0.02, None)]
 DELAY = [(1e-7, None), (4e-3, None)]
@@ -80,6 +87,7 @@ CASES: dict[str, dict[str, list[tuple[float, Imitated | None]]]] = {
     "stribeck": {"v0": SPEED},
     "thermal_drift": {"tau": [(1e-3, Imitated.OF_SPEED), (20.0, None), (1e4, None)]},
     "transmission_coupling": {"joint": [(1.0, None), (0.0, Imitated.OF_THIS_JOINT)]},
+    "unbalance": {"gear": [(1.2, None), (10.0, None), (30.0, Imitated.SPRING)]},
 }  # fmt: skip
 PHYSICAL = [e for e in CATALOGUE.values() if not e.is_nonparametric]
 
@@ -102,7 +110,7 @@ def test_every_law_with_a_knee_has_a_case():
 def test_a_law_that_is_not_linear_in_what_is_free_says_when_it_is_itself(effect):
     shapes = [p for p in effect.parameters if not (p.strength or p.fixed or p.lower == p.upper)]
     assert not shapes or effect.knees
-    assert effect.imitation(values_of(effect), SEEN) is None
+    assert effect.imitation(values_of(effect), seen_by(effect.name)) is None
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -110,7 +118,7 @@ def test_a_law_whose_knee_the_motion_does_not_pass_is_another(name):
     effect = CATALOGUE[name]
     for parameter, cases in CASES[name].items():
         for value, imitated in cases:
-            found = effect.imitation({**values_of(effect), parameter: value}, SEEN)
+            found = effect.imitation({**values_of(effect), parameter: value}, seen_by(name))
             assert (found and found.of) is imitated, (parameter, value)
             if found:
                 assert (found.size < found.edge) or (found.size > found.edge)
