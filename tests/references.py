@@ -343,13 +343,13 @@ def position_dependent_friction(p: Values, q: Columns) -> Results:
 
 
 @written_from(
-    "dE/dt = |F v| - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  sigma2 -> exp(-viscous E) sigma2"
+    "dE/dt = |F v| + idle - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  sigma2 -> exp(-viscous E) sigma2"
 )
 def thermal_drift(p: Values, q: Columns) -> Results:
     """The heat as each sample begins; a twentieth of the friction stays."""
     heat = np.zeros(len(q))
     for k in range(len(q) - 1):
-        end = abs(q.friction[k] * q.v[k]) * p["tau"]
+        end = (abs(q.friction[k] * q.v[k]) + p["idle"]) * p["tau"]
         heat[k + 1] = end + (heat[k] - end) * np.exp(-q.dt / p["tau"])
     kept = [np.maximum(np.exp(-p[n] * heat), np.exp(-3.0)) for n in ("dry", "viscous")]
     return {DRY: q.dry * kept[0], VISCOUS: q.viscous * kept[1]}

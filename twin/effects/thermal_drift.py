@@ -1,16 +1,19 @@
-"""Friction that falls while the bearing warms with friction work, and recovers at rest.
+"""Friction that falls while the bearing warms, with friction work and with the machine.
 
-dE/dt = |F v| - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  sigma2 -> exp(-viscous E) sigma2.
-E (J) is the friction heat that the bearing still holds, tau (s) its cooling time. A temperature
-inferred from friction power alone, without a sensor: L. Simoni et al., "Modelling the temperature
-in joint friction of industrial manipulators", Robotica 37 (2019); their friction is a polynomial in
-temperature, the exponential here is Reynolds' viscosity law, taken for the dry part too, where it
-is an assumption. E is exact over a sample of constant power; friction keeps a twentieth at least.
+dE/dt = |F v| + idle - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  sigma2 -> exp(-viscous E) sigma2.
+E (J) is the heat that the bearing has taken up since the log began and still holds, tau (s) its
+cooling time, idle (W) what else warms it: the motor that holds a load, the drive, the room. A
+temperature inferred from friction power alone, without a sensor: L. Simoni et al., "Modelling the
+temperature in joint friction of industrial manipulators", Robotica 37 (2019); their friction is a
+polynomial in temperature, the exponential here is Reynolds' viscosity law, taken for the dry part
+too, where it is an assumption. Heat that comes at one rate is an assumption as well: a machine that
+warms up does so whether it moves or not. E is exact over a sample of constant power; friction keeps
+a twentieth at least.
 """
 
 from math import exp
 
-from twin.effect import DRY, DT, FRICTION, MOST, VISCOUS, Effect, Kind, Parameter, V
+from twin.effect import DRY, DT, FRICTION, LEAST, MOST, VISCOUS, Effect, Kind, Parameter, V
 from twin.knee import Imitated
 from twin.law_parts import at
 
@@ -21,13 +24,13 @@ def law(p, s, io):
     io[DRY] *= exp(-min(p[0] * s[0], LARGEST))
     io[VISCOUS] *= exp(-min(p[1] * s[0], LARGEST))
     kept = exp(-io[DT] / p[2])
-    s[0] = s[0] * kept + abs(io[FRICTION] * io[V]) * p[2] * (1.0 - kept)
+    s[0] = s[0] * kept + (abs(io[FRICTION] * io[V]) + p[3]) * p[2] * (1.0 - kept)
 
 
 EFFECT = Effect(
     kind=Kind.MODIFIER,
-    summary="friction falls while the bearing warms with friction work, and recovers at rest",
-    equation="dE/dt = |F v| - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  "
+    summary="friction falls while the bearing warms with friction work and with the machine",
+    equation="dE/dt = |F v| + idle - E/tau;  Fc, Fs -> exp(-dry E) Fc, Fs;  "
     "sigma2 -> exp(-viscous E) sigma2",
     source="Simoni, Beschi, Legnani, Visioli 2019 (heat from friction power); Reynolds 1886 "
     "(exponential viscosity), extended to the dry part by assumption",
@@ -40,6 +43,10 @@ EFFECT = Effect(
             "tau", "s", 300.0, 0.1, 1e5, "cooling time",
             start_rule=lambda e: 0.5 * e.duration,
             scan=lambda e: tuple(e.duration * part for part in (0.05, 0.2, 0.7, 3.0)),
+        ),
+        Parameter(
+            "idle", "N m/s", 1.0, LEAST, MOST, "heat that comes without friction",
+            start_rule=lambda e: 0.1 * e.dry_level * e.speed_max,
         ),
     ),
     states=("heat",),

@@ -39,7 +39,7 @@ SPECIAL = {
     "pressure_friction": {"growth": 0.3, "growth_2": 0.2},
     "temperature_friction": {"T0": 0.1, "dry": 2.0, "viscous": -1.5},
     "shear_thinning": {"loss": 0.6, "vt": 0.07},
-    "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2},
+    "thermal_drift": {"dry": 70.0, "viscous": 40.0, "tau": 0.2, "idle": 0.02},
     "wear": {"rate": 300.0},
     "free_curve": {"per_metre": 2.9, "offset": -0.375, "turn": 3e-6, "rest": 0.03},
     "end_stop": {"low": -0.05, "high": 0.07, "stiffness": 3e4, "relaxation": 3e-3},
