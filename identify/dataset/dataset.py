@@ -111,6 +111,17 @@ class Dataset:
         moved = self.with_logs(log.at_length(length) for log in self.logs)
         return replace(moved, looks=self.looks + 1, asked=length)
 
+    @property
+    def exchanged(self) -> Dataset | None:
+        """The same with training and selection logs exchanged; None without selection logs."""
+        if not self.selection:
+            return None
+        fit, held = (
+            tuple(replace(log, reach=EVERYWHERE) for log in logs)
+            for logs in (self.selection, self.training)
+        )
+        return replace(self, training=fit, selection=held)
+
     def kept_in(self, axis: AxisModel) -> AxisModel:
         """An axis that was found on these logs, with what others need to tell the same errors."""
         return replace(axis, test_function=self.length, channel_delay=self.channel_delay)

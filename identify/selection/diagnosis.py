@@ -18,6 +18,7 @@ from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.lengths import at_another_length
 from identify.selection.odd_logs import without_odd_log
+from identify.selection.roles import RoleDependent, role_dependent
 from identify.selection.search import Found, Step
 from twin.effects import Catalogue
 from twin.parallel import Progress, silent
@@ -42,7 +43,8 @@ class AxisDiagnosis:
     the final fit is without. doubted: by name of each law that was taken out at the end, why, in
     words. unexplained: what the residual depends on, where it is
     not noise. small: effects that the data show and that take too little to matter. repeat: a force
-    that repeats along the track in each log, but at other places in each.
+    that repeats along the track in each log, but at other places in each. by_roles: laws that are
+    proved or not by which log chooses.
     """
 
     dataset: Dataset
@@ -57,6 +59,7 @@ class AxisDiagnosis:
     unexplained: Dependence | None = None
     small: tuple[str, ...] = ()
     repeat: Repeat | None = None
+    by_roles: tuple[RoleDependent, ...] = ()
 
     def __repr__(self) -> str:
         answer = f"{self.verdict.name.lower()} {list(self.answers)}"
@@ -151,6 +154,7 @@ def diagnose_axis(
         unexplained=None if quiet else find_dependence(final.fit, found.dataset),
         small=_small(found),
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
+        by_roles=role_dependent(found, findings),
     )
 
 

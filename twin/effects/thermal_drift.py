@@ -46,7 +46,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "idle", "N m/s", 1.0, LEAST, MOST, "heat that comes without friction",
-            start_rule=lambda e: 0.1 * e.dry_level * e.speed_max,
+            start_rule=lambda e: e.dry_level * e.speed_max,
         ),
     ),
     states=("heat",),

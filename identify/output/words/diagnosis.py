@@ -40,6 +40,7 @@ from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Confirmation, Finding, FindingKind
+from identify.selection.roles import RoleDependent
 from twin.model.machine import Hindrance
 from twin.model.units import AxisUnits, units_of
 
@@ -209,6 +210,14 @@ class Said:
     notes: tuple[str, ...]
 
 
+def role_in_words(law: RoleDependent) -> str:
+    """That a law is proved or not by which log chooses."""
+    other = f"it takes {percent(max(law.part, 0.0))} of what is left, t = {law.t:.1f}"
+    proved = "with the training and the selection logs exchanged it is"
+    says = f"{proved} not proved: {other}" if law.named else f"as they are not ({other}), {proved}"
+    return f"whether {law.effect} is proved depends on which log chooses: {says}"
+
+
 def said_of(result: Diagnosis, axis: str) -> Said:
     """The sentences about one axis of a diagnosis."""
     found, region = result.axes[axis], result.left_over.get(axis)
@@ -222,6 +231,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     beside = all_in_words(found)
     if found.small:
         beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
+    beside += [role_in_words(law) for law in found.by_roles]
     corrected, verdict = "", words(verdict_in_words(found))
     if result.body and axis in result.body.axes:
         corrected = f"with body {result.body.body} as it was found, "

@@ -320,7 +320,7 @@ def test_of_coloured_noise_alone_nothing_is_missing_over_a_floor_of_its_size(pol
 def test_both_of_two_hidden_effects_are_named() -> None:
     """Friction that warms behind a hysteresis takes next to nothing of what both leave."""
     true = having(SLIDE, "presliding_hysteresis", reach=0.004, f0=0.05, f1=0.03, f2=0.02, f3=0.01)
-    true = having(true, "thermal_drift", dry=0.4, viscous=0.0, tau=10.0)
+    true = having(true, "thermal_drift", dry=0.4, viscous=0.0, tau=10.0, idle=1e-9)
     rivals = few("presliding_hysteresis", "thermal_drift", "cogging", "asymmetric_friction", "wear")
     found = asked(SLIDE, true, rivals, ride=Ride(1, 8.0))
     assert found.named == ("presliding_hysteresis", "thermal_drift")

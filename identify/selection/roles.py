@@ -1,0 +1,83 @@
+"""What only the choice of the logs' roles decides.
+
+A law is fitted to the training logs and judged by the selection logs. Which of two like logs does
+which is the user's choice, and no property of the machine. So it is asked once more with the roles
+exchanged: of each law that was found whether it is still proved, and of those that only the
+selection logs refused whether it is then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from identify.dataset.dataset import Dataset
+from identify.rules import RULE
+from identify.selection.acceptance import Judged, Score, least_t, score
+from identify.selection.changes import control
+from identify.selection.findings import Finding
+from identify.selection.search import Found
+from identify.selection.trying import refitted_on
+
+
+@dataclass(frozen=True)
+class RoleDependent:
+    """A law that is proved by the one log and not by the other.
+
+    effect: its name. named: whether it is proved as the roles are, and not with them exchanged; or
+    the other way round. part, t: of the score that refuses it.
+    """
+
+    effect: str
+    named: bool
+    part: float
+    t: float
+
+
+def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDependent, ...]:
+    """The laws on which the answer depends by the roles of the logs; none without selection logs.
+
+    Of long logs their beginnings tell it.
+    """
+    dataset = found.dataset.part.exchanged
+    if dataset is None or (found.final.at_floor and not findings):
+        return ()
+    final = refitted_on(found.final.fit.axis, Judged(found.final.fit, dataset))
+    return (*_lost(found, findings, final), *_gained(found, final, dataset))
+
+
+def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[RoleDependent]:
+    """Of the findings those that are not proved with the roles exchanged."""
+    base = found.base.fit.axis
+    for finding in findings:
+        steps = [s for s in found.steps if s.change.name == finding.effect]
+        axis = final.fit.axis
+        for step in reversed(steps):
+            axis = step.change.undone(axis, base) or axis
+        there = score(refitted_on(axis, final), final)
+        if any(s.held or s.tried.candidate.is_noise for s in steps) or _proved(there):
+            continue
+        yield RoleDependent(finding.effect, True, there.part, there.t)
+
+
+def _gained(found: Found, final: Judged, dataset: Dataset) -> Iterator[RoleDependent]:
+    """Of the laws that only the selection logs refused those that are proved then."""
+    for tried in found.last:
+        own = tried.candidate.score
+        if own is None or tried.candidate.doubt or not _by_selection_alone(own):
+            continue
+        after = refitted_on(tried.judged.fit.axis, Judged(tried.judged.fit, dataset))
+        there = score(final, after, among=own.among)
+        if there.accepted and there.part > control(tried.change, final, after):
+            yield RoleDependent(tried.change.name, False, own.part, own.t)
+
+
+def _by_selection_alone(own: Score) -> bool:
+    """Whether the training logs would have had it."""
+    group = own.training
+    return not own.accepted and group.t >= least_t(1) and group.part >= RULE.least_part
+
+
+def _proved(there: Score) -> bool:
+    """Whether a law is proved beside all others, where it alone is asked."""
+    return replace(there, among=1).accepted
