@@ -108,9 +108,10 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined, unused
+    from identify.analysis.motor_rotor import rotors_before_gears
     from identify.analysis.recording import misassigned
     from identify.output.answers.machine import NewModelAnswer
-    from identify.output.words.recording import recording_in_words
+    from identify.output.words.recording import recording_in_words, rotor_in_words
     from twin.effects import load_catalogue
     from twin.files import kept_beside
     from twin.model.file import format_model, read_mjcf, save_model
@@ -122,7 +123,9 @@ def new(
         model = first_model(read, name or out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
-    doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
+    first = next(iter(read.values()))
+    doubt = misassigned(model, first) if model.joints else None
+    rotors = [*rotors_before_gears(model, first)] if model.joints and doubt is None else []
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
     having: dict[str, list[str]] = {}
     for axis, labels in unknown.items():
@@ -137,6 +140,7 @@ def new(
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
+    doubts += [f"{mjcf}: warning: {rotor_in_words(found, model)}" for found in rotors]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
     return Said("\n".join([text, *notes]), answer, warnings)
