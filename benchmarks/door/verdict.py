@@ -11,11 +11,12 @@ from twin.errors import InputError
 from twin.importers.units import find_unit
 
 ASSUMED = "ASSUMED"
-_KINDS = ("m", "rad", "m/s", "rad/s", "N", "N m", "A")
+_KINDS = ("m", "rad", "m/s", "rad/s", "N", "N m", "A", "Pa", "K")
 # what a signal of the map may hold
 HOLDS = {
     "position": ("position",), "velocity": ("velocity",), "setpoint_position": ("setpoint",),
     "setpoint_velocity": ("setpoint_velocity",), "force": FORCES, "current": CURRENTS,
+    "temperature": ("temperature",), "pressure": ("pressure",), "pressure_2": ("pressure",),
 }  # fmt: skip
 
 

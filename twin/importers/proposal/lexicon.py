@@ -18,7 +18,12 @@ class Quantity(Enum):
     FORCE = auto()
     CURRENT = auto()
     DRIVE = auto()  # what may stand for a force: a voltage, a duty cycle, the output of a loop
-    OTHER = auto()  # no signal of an axis: an error, a temperature, a limit, a time
+    PRESSURE = auto()
+    TEMPERATURE = auto()
+    OTHER = auto()  # no signal of an axis: an error, a limit, a time
+
+
+CHANNELS = (Quantity.PRESSURE, Quantity.TEMPERATURE)  # beside the motion and its force
 
 
 class Role(Enum):
@@ -47,12 +52,15 @@ QUANTITIES: Mapping[Quantity, str] = {
         current currents curr cur crnt amps ampere iq isq strom courant intensite 电流 電流""",
     Quantity.DRIVE: """
         pwm duty voltage volt volts spannung tension ctrl 电压 電圧""",
+    Quantity.PRESSURE: "pressure pressures press druck pression 压力 圧力",
+    Quantity.TEMPERATURE: """
+        temperature temperatures temperatur temperaturen temp 温度""",
     Quantity.OTHER: """
         error err ferr ferror deviation difference diff lag following schleppfehler schleppabstand
         fehler regeldifferenz abweichung erreur ecart droop 误差 偏差 誤差 jerk ruck
-        temperature temperatur temp 温度 power leistung puissance 功率 電力 energy
-        limit limits max min maximum minimum supply bus vbus battery humidity pressure druck
-        pression 压力 圧力 mode fault faults enable enabled activated trigger flag flags alarm
+        power leistung puissance 功率 電力 energy
+        limit limits max min maximum minimum supply bus vbus battery humidity
+        barometric barometer mode fault faults enable enabled activated trigger flag flags alarm
         word bit bits code checksum crc id index count counter frame seq line row sample gain
         covariance frequency phase tool payload friction gravity coriolis noise
         time times timestamp stamp temps zeit clock date datum uhrzeit 时间 時間""",
@@ -213,16 +221,23 @@ UNITS: Mapping[Quantity, Mapping[str, str]] = {
     },
     Quantity.CURRENT: {"A": "arms aeff apk amp amps ampere a_rms", "mA": "marms", "uA": "µa μa"},
     Quantity.DRIVE: {"V": "volt volts", "mV": "", "%": "percent pct prozent"},
+    Quantity.PRESSURE: {
+        "bar": "",
+        "mbar": "",
+        "Pa": "",
+        "hPa": "",
+        "kPa": "",
+        "MPa": "",
+        "psi": "psig psia",
+    },
+    Quantity.TEMPERATURE: {"degC": "°c ℃ c degc celsius", "K": "kelvin"},
     Quantity.OTHER: {
         "s": "sec secs second seconds sekunden 秒",
         "ms": "msec milliseconds millis",
         "us": "µs μs usec micros microseconds",
         "ns": "",
-        "degC": "°c ℃ c degc celsius",
-        "K": "",
         "W": "watt",
         "kW": "",
         "Hz": "khz mhz",
-        "bar": "mbar kpa mpa pa psi",
     },
 }
