@@ -102,7 +102,10 @@ def _judge_entry(
     column = _of(out.recording, table["column"])
     name = f"{entry} = {table['column']}"
     if column is None or entry not in HOLDS or column.holds not in HOLDS[entry]:
-        out.wrong.append(f"{name}: holds {column.holds if column else 'nothing of an axis'}")
+        said = (
+            out.assumed if "measured ASSUMED" in line or "asked for ASSUMED" in line else out.wrong
+        )
+        said.append(f"{name}: holds {column.holds if column else 'nothing of an axis'}")
         return
     if axis is not None and column.axis != axis.axis:
         out.wrong.append(f"{name}: of axis {column.axis}, not {axis.axis}")

@@ -19,6 +19,7 @@ from identify.cli.shared import (
     Recordings,
     app,
     loaded,
+    meaningless,
     was_kept,
     written,
 )
@@ -116,7 +117,7 @@ def new(
     from twin.files import kept_beside
     from twin.model.file import format_model, read_mjcf, save_model
 
-    recorded = CheckedRecordings(logs)
+    recorded = CheckedRecordings(logs, refused=meaningless(() if mjcf is None else (mjcf.stem,)))
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read, known = dict(recorded), _masses(mass or ())
     with recorded.explaining():

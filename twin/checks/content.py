@@ -17,6 +17,7 @@ from twin.signals import Array, stretches
 # Whoever knows it to be right takes the word away.
 ASSUMED = "ASSUMED"
 MAP = "import_map"  # entry of a log's metadata: the map as it was written
+PARTIAL = "partial."  # the same of an axis, "partial.x": a part of its force is missing for sure
 DOUBT = "doubt."  # the same of an axis, "doubt.x.0": what its signals say against the map
 COUNTER = "counter."  # such an entry of an axis' signal, "counter.x.current": that it begins again
 _TABLE = re.compile(r"\[axes\.\"?(\w+)\"?\]")
@@ -106,8 +107,10 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding
             size = what.rpartition(" ")[2]
             remedy = f"give wraps = {size} for its {field} in the map and import again"
             yield LogFinding(Severity.ERROR, Fault.WRAPPED, axis, what, WHOLE, remedy)
+        said, _, remedy = what.partition(": ")[2].rpartition("; ")
+        if key == f"{PARTIAL}{axis}":
+            yield LogFinding(Severity.ERROR, Fault.PARTIAL, axis, said, WHOLE, remedy)
         if key.startswith(f"{DOUBT}{axis}."):
-            said, _, remedy = what.partition(": ")[2].rpartition("; ")
             yield LogFinding(Severity.WARNING, Fault.ASSUMED, axis, said, WHOLE, remedy)
     if found := assumptions(metadata.get(MAP, ""), axis):
         yield LogFinding(

@@ -355,3 +355,13 @@ def test_units_below_the_names_are_read(tmp_path):
     assert text.count("ASSUMED") == 1  # in the first line, of what is to be corrected
     log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
+
+
+def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tmp_path):
+    """A setpoint that comes later than its position is none by the numbers."""
+    later = np.concatenate([np.zeros(2), REACHED[:-2]])
+    columns = {"t": T, "Position measured": REACHED, "Setpoint": later, "force [N]": PUSH}
+    write_csv(tmp_path / "a.csv", columns)
+    text = guess_map(tmp_path / "a.csv").text
+    assert "which of both is measured ASSUMED" in text
+    assert "which of both is asked for ASSUMED" in text

@@ -209,6 +209,12 @@ def exchanged(file: File, axis: Axis) -> Axis:
         why = f"rougher and later than {setpoint.column}, as a reading is"
         return axis.having(position.told(why, Certainty.SURE))
     least = min(others, key=lambda n: votes[n.column], default=None)
+    if setpoint is not None and votes[setpoint.column] == -1:
+        why = f"although {setpoint.column} is rougher or later, as a reading is"
+        return axis.having(
+            replace(position.told(why, Certainty.UNSURE), assumed="which of both is measured"),
+            replace(setpoint, certainty=Certainty.UNSURE, assumed="which of both is asked for"),
+        )
     if least is None or votes[least.column] > -2:
         named = position.name.quantity is not None
         sure = named and axis.motion is not None and axis.motion.explains

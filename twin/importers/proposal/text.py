@@ -84,7 +84,9 @@ class Entry:
         why = ", ".join(self.signal.reasons)
         span = f"{column.values.min():.4g} to {column.values.max():.4g}"
         jumps = () if column.wraps is None else (f"jumps back by {column.wraps:.6g}: it wraps",)
-        told = "; ".join((f"{self.signal.certainty.value}: {why}", span, *jumps, *self.remarks))
+        assumed = (f"{self.signal.assumed} ASSUMED",) if self.signal.assumed else ()
+        sure = f"{self.signal.certainty.value}: {why}"
+        told = "; ".join((sure, span, *jumps, *assumed, *self.remarks))
         return f"{self.signal.field} = {{{table}}} # {told}"
 
     def answered(self, answers: Answers) -> Entry:
