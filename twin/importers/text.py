@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator,
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 from operator import methodcaller
 from pathlib import Path
 from typing import TextIO
@@ -49,12 +50,14 @@ class Style:
         text = line.strip(" \r\n").removeprefix("#").strip(" ")
         if self.delimiter is None:
             return text.split()
+        if '"' not in text:  # of a million lines nearly all
+            return [cell.strip() for cell in text.split(self.delimiter)] if text else []
         return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
 
     def value(self, cell: str) -> float:
         """The number in a cell, which may group its thousands; raises ValueError."""
         try:
-            return float(cell.replace(self.decimal, "."))
+            return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
         except ValueError:
             other = "." if self.decimal == "," else ","
             if not re.fullmatch(rf"[-+]?\d{{1,3}}([{other}'’ \xa0]\d{{3}})+([.,]\d+)?", cell):
@@ -286,8 +289,10 @@ def _row_by_row(
             for k in where:
                 cell = cells[k] if k < len(cells) else ""
                 try:
-                    columns[k].append(stamps[k].add(cell) if k in stamps else
-                                      layout.style.value(cell))  # fmt: skip
+                    value = stamps[k].add(cell) if k in stamps else layout.style.value(cell)
+                    columns[k].append(value)
+                    if not isfinite(value):
+                        bad.add_not_finite(row, k)
                 except ValueError:
                     bad.add(row, k)
                     columns[k].append(-1 if k in stamps else np.nan)

@@ -343,7 +343,9 @@ def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):
     write_csv(tmp_path / "a.csv", columns)
     found = guess_map(tmp_path / "a.csv")
     (what,) = found.missing
-    assert what.startswith("column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all; ")
+    assert what.startswith(
+        "column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all, also in line 52; "
+    )
     assert columns_of(found.text) == {"x": {"position": "pos_mm", "force": "force_N"}}
 
 
