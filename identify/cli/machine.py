@@ -137,7 +137,9 @@ def new(
         "no break away from rest takes more than Coulomb friction; it is set to that"
         for label, axes in having.items()
     ]
-    text = f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, logs[0])}`"
+    text = (
+        f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, *_in_roles(logs))}`"
+    )
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
@@ -145,6 +147,13 @@ def new(
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
     return Said("\n".join([text, *notes]), answer, warnings)
+
+
+def _in_roles(logs: Sequence[Path]) -> list[object]:
+    """The logs as a diagnosis takes them: the last but one chooses, the last tests."""
+    *training, selection, test = [*logs, None, None][: max(len(logs), 3)]
+    roles = [("--holdout", selection), ("--test", test)]
+    return [*training, *(word for role, log in roles if log for word in (role, log))]
 
 
 def _masses(given: Sequence[str]) -> Masses | None:
