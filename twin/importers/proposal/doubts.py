@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from twin.checks.content import DOUBT, PARTIAL
 from twin.importers.proposal.courses import Column, course, follows, sign_of
 from twin.importers.proposal.motion import Explained, explained
 from twin.importers.proposal.units import near
 from twin.logs.log import AxisLog, Log
 
+DOUBT, PARTIAL = "doubt.", "partial."  # entries of a log's metadata, which a check reads
 PUSHES = (
     "the force helps the motion where friction resists it (negative friction); a part of the "
     "command is missing in this column, such as its feedforward; map the whole force"
