@@ -173,22 +173,28 @@ FIRST, EVERY = 5.0, 10.0  # s until the first line, and from one to the next
 
 @dataclass(frozen=True)
 class Progressed:
-    """Part of a command's work. first: how much of it was done when it began, at ``begun`` (s)."""
+    """Part of a command's work. first: how much of it was done when it began, at ``begun`` (s).
+
+    since: when as much as ``done`` was done, s.
+    """
 
     what: str
     done: int
     total: int
     first: int
     begun: float
+    since: float
 
     def left(self, now: float) -> float | None:
         """s until it ends, where the rest goes as fast as what was done; None where that is none.
 
-        What is under way is not counted, so the time grows where it takes longer than the others.
+        It only falls until more is done; None too where that takes longer than all of the rest.
         """
         if self.done <= self.first or self.done >= self.total:
             return None
-        return (now - self.begun) / (self.done - self.first) * (self.total - self.done)
+        each = (self.since - self.begun) / (self.done - self.first)
+        left = each * (self.total - self.done) - (now - self.since)
+        return left if left > 0.0 else None
 
     def words(self, now: float) -> str:
         """What is done, how much of it, and how long that still takes."""
@@ -213,13 +219,15 @@ class Shown:
 
     def __init__(self) -> None:
         self.begun = monotonic()
-        self.part = Progressed("starting", 0, 0, 0, self.begun)
+        self.part = Progressed("starting", 0, 0, 0, self.begun, self.begun)
 
     def __call__(self, what: str, done: int, total: int) -> None:
         same = what == self.part.what and total == self.part.total and done > self.part.done
         now = monotonic()
         self.part = (
-            replace(self.part, done=done) if same else Progressed(what, done, total, done, now)
+            replace(self.part, done=done, since=now)
+            if same
+            else Progressed(what, done, total, done, now, now)
         )
 
     def __str__(self) -> str:
