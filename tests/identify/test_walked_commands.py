@@ -70,7 +70,11 @@ def two_axes(folder: Path, seconds: float) -> tuple[str, ...]:
 def printed_in(done: Done) -> Iterator[str]:
     """The commands in what a command says."""
     text = f"{done.stdout}\n{done.stderr}"
-    for pattern in (r"`(twin [^`\n]* [^`\n]*)`", r"(?m)^\s*next: (twin .*)$", r"(?m)^  (twin import .*)$"):
+    for pattern in (
+        r"`(twin [^`\n]* [^`\n]*)`",
+        r"(?m)^\s*next: (twin .*)$",
+        r"(?m)^  (twin import .*)$",
+    ):
         yield from re.findall(pattern, text)
 
 

@@ -29,7 +29,7 @@ from twin.importers.mapping import ImportMap
 from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
 from twin.importers.table import SignalTable, chosen
 
-ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".prn")
 HEAD = 1 << 16  # bytes in which a dialect is known and its first row is found
 _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
 _MARKS = (
@@ -46,8 +46,8 @@ class Style:
     decimal: str
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line; one that begins with # has no other first cell for that."""
-        text = line.strip(" \r\n").removeprefix("#").strip(" ")
+        """The cells of a line; one that begins with # or % has no other first cell for that."""
+        text = line.strip(" \r\n").removeprefix("#").removeprefix("%").strip(" ")
         if self.delimiter is None:
             return text.split()
         if '"' not in text:  # of a million lines nearly all
@@ -59,6 +59,8 @@ class Style:
         try:
             return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
         except ValueError:
+            if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
+                return self.value(re.sub("[dD]", "e", cell))
             other = "." if self.decimal == "," else ","
             if not re.fullmatch(rf"[-+]?\d{{1,3}}([{other}'’ \xa0]\d{{3}})+([.,]\d+)?", cell):
                 raise

@@ -17,6 +17,8 @@ from mcap_bytes import of
 
 from twin.errors import InputError
 from twin.importers import import_log, told_of
+from twin.importers.importer import table_of
+from twin.importers.mapping import EVERY_COLUMN
 from twin.logs import Log
 from twin.logs.topics import instant
 
@@ -214,3 +216,35 @@ def test_times_since_1970_are_shown_as_dates(tmp_path):
     text = map_of("q", "q", clock="t in s")
     with pytest.raises(InputError, match=r"between 2023-11-14 22:13:20\.199 UTC and 2023"):
         imported(tmp_path, "a.csv", text)
+
+
+LVM = (
+    "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t,\n***End_of_Header***\n\n"
+    "Channels\t2\nSamples\t400\t400\nDate\t2024/05/03\t2024/05/03\nX_Dimension\tTime\tTime\n"
+    "Delta_X\t0,002\t0,002\n***End_of_Header***\nX_Value\tWeg (mm)\tKraft (N)\tComment\n"
+)
+
+
+def rows(form: str, decimal: str = ".") -> str:
+    time, force = 0.002 * np.arange(400), np.cos(5.0 * 0.002 * np.arange(400))
+    lines = (form.format(t, 30.0 * np.sin(3.0 * t), f) for t, f in zip(time, force, strict=True))
+    return "".join(lines).replace(".", decimal)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "position"),
+    [
+        ("a.lvm", LVM + rows("{:.6f}\t{:.6f}\t{:.5f}\n", ","), "Weg (mm)"),
+        ("a.dat", "%   t   y_mm   F\n" + rows(3 * "{:16.8E}" + "\n").replace("E", "D"), "y_mm"),
+        ("a.jsonl", rows('{{"t": {:.4f}, "axis": {{"pos": {:.6f}, "u": {:.5f}}}}}\n'), "axis.pos"),
+        ("a.log", "boot\n" + rows("t: {:.4f} s, pos: {:.6f} mm, u: {:.5f}\n"), "pos [mm]"),
+    ],
+    ids=["names wider than rows", "a mark before the names", "a table a line", "labels"],
+)  # fmt: skip
+def test_files_of_other_tools_are_read(tmp_path, name, text, position):
+    """A block of settings above the names, Fortran's exponents, JSON lines, a serial plotter."""
+    (tmp_path / name).write_text(text)
+    table = table_of(tmp_path / name, EVERY_COLUMN)
+    np.testing.assert_allclose(
+        table.columns[position], 30.0 * np.sin(0.006 * np.arange(400)), atol=1e-5
+    )
