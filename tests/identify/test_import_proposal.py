@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_runs import refusal, twin
+from import_cases import write_csv
 from strict_json import valid
 
 from twin.importers import load_mapping
@@ -146,6 +147,37 @@ def test_an_import_says_what_its_signals_contradict(recording):
     assert done.returncode == 0
     assert "map.toml: warning: axes.x: the motion explains 57 % of the force" in done.stderr
     assert "give the force or the position sign = -1" in done.stderr
+
+
+def test_an_import_by_a_map_says_what_its_clock_did(tmp_path):
+    micros = (2**32 - 5 * 10**5 + 1000 * np.arange(2000)) % 2**32
+    place = np.sin(0.006 * np.arange(2000))
+    write_csv(tmp_path / "a.csv", {"us": micros, "m": place, "N": 2.0 * np.cos(place)})
+    (tmp_path / "map.toml").write_text(
+        'time = {column = "us", unit = "us"}\n[axes.x]\n'
+        'position = {column = "m", unit = "m"}\nforce = {column = "N", unit = "N"}\n'
+    )
+    done = twin("import", "a.csv", "--map", "map.toml", "-o", "a.mcap", folder=tmp_path)
+    assert done.stdout == "a.mcap: 2000 samples at 1000 Hz\n"
+    assert "the roll-over of a counter of 32 bits is taken out" in done.stderr
+
+
+def test_nothing_is_fitted_to_a_force_that_works_on_friction(tmp_path):
+    """A part of the command, of which the feedforward of friction is missing, is no force."""
+    t = 0.002 * np.arange(4000)
+    place = 0.1 * np.sin(2.0 * t) + 0.03 * np.sin(7.0 * t)
+    speed = np.gradient(place, 0.002)
+    force = 5.0 * np.gradient(speed, 0.002) + 8.0 * speed - 1.0 * np.sign(speed)
+    write_csv(tmp_path / "a.csv", {"t": t, "m": place, "N": force})
+    (tmp_path / "map.toml").write_text(
+        'time = {column = "t", unit = "s"}\n[axes.x]\n'
+        'position = {column = "m", unit = "m"}\nforce = {column = "N", unit = "N"}\n'
+    )
+    done = twin("import", "a.csv", "--map", "map.toml", "-o", "a.mcap", folder=tmp_path)
+    assert "negative friction" in done.stderr
+    assert twin("check", "a.mcap", folder=tmp_path).returncode == 1
+    said = refusal("new", "a.mcap", "-o", "m.toml", folder=tmp_path)
+    assert "map the whole force; nothing is fitted to it" in said
 
 
 def test_what_cannot_be_proposed_is_refused_in_a_line(recording):
