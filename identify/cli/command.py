@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 from typer.core import TyperCommand
 
-from twin.errors import InputError
+from twin.errors import InputError, Unwritten
 from twin.files import is_same_file, require_writable
 from twin.parallel import Progress, silent
 
@@ -54,13 +54,26 @@ AS_JSON = inspect.Parameter(
 class Said:
     """What a command says: text or, with --json, the answer; warnings on standard error.
 
-    fine: whether the exit code is 0, else 1.
+    fine: whether the exit code is 0, else 1. unwritten: errors of files that could not be written
+    after all was computed; they come behind the text, with exit code 2.
     """
 
     text: str
     answer: Answer
     warnings: Sequence[str] = ()
     fine: bool = True
+    unwritten: Sequence[str] = ()
+
+
+def tried(*writes: Callable[[], object]) -> tuple[str, ...]:
+    """What of some files could not be written, an error each: an answer is told all the same."""
+    errors = []
+    for write in writes:
+        try:
+            write()
+        except Unwritten as error:
+            errors.append(str(error))
+    return tuple(errors)
 
 
 class Commands(typer.Typer):
@@ -79,7 +92,9 @@ class Commands(typer.Typer):
                 for warning in said.warnings:
                     print(f"twin: {warning}", file=sys.stderr)
                 print(json.dumps(said.answer.entries()) if as_json else said.text)
-                return 0 if said.fine else 1
+                for error in said.unwritten:
+                    print(f"twin: {error}", file=sys.stderr)
+                return 2 if said.unwritten else 0 if said.fine else 1
 
             parameters = [*own.parameters.values(), AS_JSON]
             run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]

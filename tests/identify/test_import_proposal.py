@@ -13,6 +13,7 @@ from cli_runs import refusal, twin
 from import_cases import write_csv
 from strict_json import valid
 
+from twin.errors import Unwritten
 from twin.importers import load_mapping
 from twin.logs import read_log
 
@@ -186,3 +187,19 @@ def test_what_cannot_be_proposed_is_refused_in_a_line(recording):
         "import", recording.name, recording.name, folder=folder
     )
     assert "give -o LOG" in refusal("import", recording.name, "--map", "m.toml", folder=folder)
+
+
+def test_on_a_disk_that_fills_meanwhile_the_answer_is_told_all_the_same(recording, monkeypatch):
+    def fills(_model, path):
+        raise Unwritten(f"{path}: cannot be written: No space left on device")
+
+    folder = recording.parent
+    assert twin("import", recording.name, "--yes", "-o", "a.mcap", folder=folder).stdout
+    assert twin("new", "a.mcap", "-o", "m.toml", folder=folder).returncode == 0
+    monkeypatch.setattr("twin.model.file.save_model", fills)
+    done = twin("fit", "m.toml", "a.mcap", "-o", "f.toml", folder=folder)
+    assert done.returncode == 2
+    assert "force error on the training logs" in done.stdout
+    assert (
+        done.stderr.splitlines()[-1] == "twin: f.toml: cannot be written: No space left on device"
+    )
