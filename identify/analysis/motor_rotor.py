@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.analysis.recording import balances
+from identify.analysis.recording import balances, head_of
 from twin.checks import moves
 from twin.checks.content import MAP
 from twin.logs import Log
@@ -42,16 +42,17 @@ class RotorBeforeGear:
 def rotors_before_gears(model: MachineModel, log: Log) -> Iterator[RotorBeforeGear]:
     """The joints whose rotor is stated before the gear, by what a log asks for.
 
-    model: its axes are joints of a mechanism. The gear is that of the log's import map, or of the
-    joint's motor in the file.
+    model: of any machine; only the joints of a mechanism have such a rotor. The gear is that of the
+    log's import map, or of the joint's motor in the file.
     """
-    rotors = {a: own.weighed.mass - own.mass for a, own in model.axes.items() if moves(log, a)}
+    joints = {a: own for a, own in model.axes.items() if a in model.joints and a in log.axes}
+    rotors = {a: own.weighed.mass - own.mass for a, own in joints.items() if moves(log, a)}
     gears = {a: _gear(model, log, a) for a, rotor in rotors.items() if rotor > 0.0}
     far, about = 2.0, 1.5  # times: a gear that matters; how near an inertia is so rough a one
     sure = 3.0  # times its error, that what the log asks for beside the stated one is
     if not any(gear > far for gear in gears.values()):
         return
-    own = balances(model, log, [*rotors])
+    own = balances(model, head_of(model, log), [*rotors])
     for axis, gear in gears.items():
         more, error = own[axis].inertia()
         found = RotorBeforeGear(axis, rotors[axis], rotors[axis] + more, gear)

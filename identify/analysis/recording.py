@@ -55,7 +55,7 @@ def misassigned(model: MachineModel, log: Log) -> Recording | None:
     model: its axes are joints of a mechanism.
     """
     going = [axis for axis in model.joints if moves(log, axis)]
-    head = _thinned(_plain(log), len(model.joints))
+    head = head_of(model, log)
     found: Recording | None = None
     for _ in going:  # each may be another in a way of its own
         tried = _best_of(model, head, going)
@@ -64,6 +64,11 @@ def misassigned(model: MachineModel, log: Log) -> Recording | None:
         head = tried.read(head)
         found = tried if found is None else _both(found, tried)
     return found
+
+
+def head_of(model: MachineModel, log: Log) -> Log:
+    """As much of a log as tells it of the joints of a mechanism, positions and torques alone."""
+    return _thinned(_plain(log), len(model.joints))
 
 
 def _both(first: Recording, then: Recording) -> Recording:

@@ -165,7 +165,19 @@ def diagnose(
     failed = tried(*writes)
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
     text = diagnose_text(done.result, source)
-    return Said(text, answer, done.warnings, unwritten=failed)
+    warnings = [*done.warnings, *_of_rotors(machine, logs)]
+    return Said(text, answer, warnings, unwritten=failed)
+
+
+def _of_rotors(machine: MachineModel, logs: Sequence[Path]) -> list[str]:
+    """The rotors that the file of a mechanism states as before their gears."""
+    if not machine.joints:
+        return []
+    from identify.analysis.motor_rotor import rotors_before_gears
+    from identify.output.words.recording import rotor_in_words
+
+    first = Recordings(logs[:1])[str(logs[0])]
+    return [rotor_in_words(found, machine) for found in rotors_before_gears(machine, first)]
 
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:

@@ -126,7 +126,7 @@ def new(
     save_model(model, out)
     first = next(iter(read.values()))
     doubt = misassigned(model, first) if model.joints else None
-    rotors = [*rotors_before_gears(model, first)] if model.joints and doubt is None else []
+    rotors = [] if doubt else [*rotors_before_gears(model, first)]
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
     having: dict[str, list[str]] = {}
     for axis, labels in unknown.items():
@@ -143,7 +143,7 @@ def new(
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
-    doubts += [f"{mjcf}: warning: {rotor_in_words(found, model)}" for found in rotors]
+    doubts += [rotor_in_words(found, model) for found in rotors]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
     return Said("\n".join([text, *notes]), answer, warnings)

@@ -31,10 +31,10 @@ def read_otherwise_in_words(found: Recording) -> list[str]:
 
 def rotor_in_words(found: RotorBeforeGear, model: MachineModel) -> str:
     """That a file states a rotor before its gear, and what to state in its place."""
-    unit = model.axes[found.axis].units.mass
+    unit, file = model.axes[found.axis].units.mass, model.mjcf_name
     return (
-        f"axis {found.axis}: armature {found.stated:.3g} {unit} is that of the rotor alone; behind "
-        f"the gear of {found.gear:g} the joint feels {found.gear:g}^2 times that, "
-        f"{found.at_joint:.3g} {unit}, and the log asks for {found.asked:.3g} {unit}; state "
+        f"{file}: warning: axis {found.axis}: armature {found.stated:.3g} {unit} is that of the "
+        f"rotor alone; behind the gear of {found.gear:g} the joint feels {found.gear:g}^2 times "
+        f"that, {found.at_joint:.3g} {unit}, and the log asks for {found.asked:.3g} {unit}; state "
         f'armature="{found.at_joint:.3g}" in the file'
     )
