@@ -248,3 +248,30 @@ def test_files_of_other_tools_are_read(tmp_path, name, text, position):
     np.testing.assert_allclose(
         table.columns[position], 30.0 * np.sin(0.006 * np.arange(400)), atol=1e-5
     )
+
+
+@pytest.mark.parametrize(
+    ("encoding", "names", "position"),
+    [
+        ("gb18030", "时间(ms),实际位置(mm),电机电流(A)", "实际位置(mm)"),
+        ("shift_jis", "時間[s],位置フィードバック[mm],トルク[%]", "位置フィードバック[mm]"),
+        ("cp1252", "Zeit [s],Lage für Übung [mm],Kraft [N]", "Lage für Übung [mm]"),
+        ("utf-8", "Time [s],位置[mm],F [N]", "位置[mm]"),
+    ],
+)
+def test_the_encoding_is_the_one_in_which_its_words_are_known(tmp_path, encoding, names, position):
+    text = f"{names}\n" + rows("{:.4f},{:.6f},{:.5f}\n")
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    assert position in table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
+
+
+def test_names_between_a_title_and_units_and_times_with_a_unit_in_each_cell(tmp_path):
+    """As of IndraDrive, whose first name is left out, and of MATLAB's timetables."""
+    (tmp_path / "a.csv").write_text(
+        "Oszilloskop;;;\n;Lage-Istwert;Kraft-Istwert;\n[ms];[mm];[N];\n"
+        + rows("{:.4f};{:.6f};{:.5f};\n", ",")
+    )
+    assert "Lage-Istwert [mm]" in table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
+    (tmp_path / "b.csv").write_text("Time,q,u\n" + rows("{:.4f} sec,{:.6f},{:.5f}\n"))
+    columns = table_of(tmp_path / "b.csv", EVERY_COLUMN).columns
+    np.testing.assert_allclose(columns["Time"], 0.002 * np.arange(400), atol=1e-9)

@@ -140,8 +140,8 @@ def _header(rows: Rows, spaced: Rows, skip: int, header_line: int | None) -> int
         if len(filled) >= width - 1 and len(set(filled)) == len(filled) and _is_names(filled):
             return k
     named = [k for k in fitting if any(re.search(r"\w", cell) for cell in rows[k])]
-    if named:
-        return named[-1]
+    if named:  # the one with most names, of like ones the first
+        return max(named, key=lambda k: (_count_of_names(rows[k]), -k))
     above = next((rows[k] for k in near if any(rows[k])), [])
     if len(above) > 1:
         raise InputError(
@@ -155,6 +155,12 @@ def _widths(row: Sequence[str]) -> tuple[int, ...]:
     """How many names a row may have: rows may end in a delimiter, and times have a date before."""
     dated = any(is_date(a) and is_stamp(b) for a, b in pairwise(row))
     return (len(row), len(row) - 1) if not row[-1] or dated else (len(row),)
+
+
+def _count_of_names(cells: Sequence[str]) -> int:
+    """How many of some cells are words, and no units."""
+    words = (cell for cell in cells if re.search(r"[^\W\d_]", cell))
+    return sum(not is_usual_unit(cell.strip("[]() ")) for cell in words)
 
 
 def _is_names(cells: Sequence[str]) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum, auto
+from functools import cache
 
 
 class Quantity(Enum):
@@ -103,6 +104,13 @@ ROLES: Mapping[Role, str] = {
 
 def _set(words: str) -> frozenset[str]:
     return frozenset(words.split())
+
+
+@cache
+def words_of_the_far_east() -> frozenset[str]:
+    """Those of several signs that are not Latin."""
+    words = " ".join((*QUANTITIES.values(), *ROLES.values()))
+    return frozenset(w for w in words.split() if len(w) > 1 and ord(w[0]) > 0x2E7F)
 
 
 SMOOTHED = _set("filtered filt smoothed sm avg averaged lowpass lp gefiltert")
