@@ -169,7 +169,7 @@ if (data.length) {
     const [least, most] = usual(axis.residuals.flatMap(name => axis.values(name)));
     plots.push(plot($("left"), {...common, hooks: {...hooks, ...band}, height: 230, labels: ["", `${axis.texts.residual} (${left.unit})`],
       scales: {y: {range: (u, low, high) => {
-        const all = u.scales.x.min <= x[0] && u.scales.x.max >= x[x.length - 1];
+        const view = u.scales.x, all = view.min == null || view.min <= x[0] && view.max >= x[x.length - 1];
         return padded(Math.min(Math.max(low ?? 0, all ? least : -Infinity), -axis.floor), Math.max(Math.min(high ?? 0, all ? most : Infinity), axis.floor));
       }}},
       series: axis.residuals.map((name, i) => line(title(name), [BEFORE, AFTER][i], left.unit))},
