@@ -19,6 +19,10 @@ class CannotRun(InputError):
     """
 
 
+class Unwritten(InputError):
+    """A file that could not be written, though its name and folder were good: a disk is full."""
+
+
 @contextmanager
 def at(place: str) -> Iterator[None]:
     """Prefix the message of an InputError with where it happened, and keep it one line."""

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from pathlib import Path
 from typing import BinaryIO
 
-from twin.errors import InputError
+from twin.errors import InputError, Unwritten
 
 PART = ".twin-part"
 UNFINISHED = ".unfinished"  # a recording, of which a killed run leaves what it has written
@@ -187,7 +187,7 @@ def _explained(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or error
-        raise InputError(
+        raise Unwritten(
             f"{path}: cannot be written: {reason}; check folder, rights and free space"
         ) from error
 

@@ -128,3 +128,25 @@ def sliding_products(signal: Array, patterns: Array) -> Array:
     size = 1 << (len(signal) - 1).bit_length()
     spectra = np.fft.rfft(signal, size) * np.conj(np.fft.rfft(patterns, size))
     return np.fft.irfft(spectra, size)[..., : len(signal) - patterns.shape[-1] + 1]
+
+
+def count_of(signal: Array) -> float:
+    """One count of a signal that stays at some value, and goes by whole counts to the next.
+
+    It passes a few samples between, where it was resampled. 0 where no count shows.
+    """
+    first, last = stretches(np.diff(signal) != 0.0).T
+    passed_in = 4  # samples in which a count is passed
+    ways = np.abs(signal[last] - signal[first])[last - first <= passed_in]
+    ways = ways[ways > 0.0]
+    if len(ways) < 5:  # that tell one
+        return 0.0
+    # parts of the ways that may be less, as text far from 0 is coarser
+    one_count = (0.5, 0.25, 0.1)
+    for count in np.quantile(ways, one_count):
+        off = np.abs(ways / count - np.round(ways / count))
+        whole_way = 0.05  # of a count: how far a way may be off a whole one
+        whole = ways[(off < whole_way) & (ways > 0.5 * count)]
+        if whole.sum() > 0.9 * ways.sum():  # least part of the ways that are whole ones
+            return float(count)
+    return 0.0

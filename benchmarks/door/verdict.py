@@ -11,11 +11,12 @@ from twin.errors import InputError
 from twin.importers.units import find_unit
 
 ASSUMED = "ASSUMED"
-_KINDS = ("m", "rad", "m/s", "rad/s", "N", "N m", "A")
+_KINDS = ("m", "rad", "m/s", "rad/s", "N", "N m", "A", "Pa", "K")
 # what a signal of the map may hold
 HOLDS = {
     "position": ("position",), "velocity": ("velocity",), "setpoint_position": ("setpoint",),
     "setpoint_velocity": ("setpoint_velocity",), "force": FORCES, "current": CURRENTS,
+    "temperature": ("temperature",), "pressure": ("pressure",), "pressure_2": ("pressure",),
 }  # fmt: skip
 
 
@@ -101,7 +102,10 @@ def _judge_entry(
     column = _of(out.recording, table["column"])
     name = f"{entry} = {table['column']}"
     if column is None or entry not in HOLDS or column.holds not in HOLDS[entry]:
-        out.wrong.append(f"{name}: holds {column.holds if column else 'nothing of an axis'}")
+        said = (
+            out.assumed if "measured ASSUMED" in line or "asked for ASSUMED" in line else out.wrong
+        )
+        said.append(f"{name}: holds {column.holds if column else 'nothing of an axis'}")
         return
     if axis is not None and column.axis != axis.axis:
         out.wrong.append(f"{name}: of axis {column.axis}, not {axis.axis}")

@@ -55,7 +55,7 @@ def misassigned(model: MachineModel, log: Log) -> Recording | None:
     model: its axes are joints of a mechanism.
     """
     going = [axis for axis in model.joints if moves(log, axis)]
-    head = _thinned(_plain(log), len(model.joints))
+    head = head_of(model, log)
     found: Recording | None = None
     for _ in going:  # each may be another in a way of its own
         tried = _best_of(model, head, going)
@@ -66,6 +66,11 @@ def misassigned(model: MachineModel, log: Log) -> Recording | None:
     return found
 
 
+def head_of(model: MachineModel, log: Log) -> Log:
+    """As much of a log as tells it of the joints of a mechanism, positions and torques alone."""
+    return _thinned(_plain(log), len(model.joints))
+
+
 def _both(first: Recording, then: Recording) -> Recording:
     said = f"{first.said}; and {then.said}"
     return replace(first, said=said, read=InTurn((first.read, then.read)))
@@ -73,7 +78,7 @@ def _both(first: Recording, then: Recording) -> Recording:
 
 def _best_of(model: MachineModel, log: Log, going: Sequence[str]) -> Recording | None:
     """The way by which least is left of a log, where it is clearly less than as it is."""
-    plain = _balances(model, log, going)
+    plain = balances(model, log, going)
     parts = np.array([plain[axis].left() for axis in going])
     if max(parts, default=0.0) < LEAST_LEFT:
         return None
@@ -82,8 +87,8 @@ def _best_of(model: MachineModel, log: Log, going: Sequence[str]) -> Recording |
     suspects = [axis for axis in going if axis in {a for _, a in worst}]
     tried = [*_of_torques(model, plain, going, suspects)]
     for way, said in _of_positions(model, log, suspects):
-        balances = _balances(model, way(log), going)
-        tried.append((np.array([balances[a].left() for a in going]), way, said))
+        otherwise = balances(model, way(log), going)
+        tried.append((np.array([otherwise[a].left() for a in going]), way, said))
     floor = np.maximum(parts, LEAST_LEFT)
     # Joint by joint, as one whose coupling or friction the model lacks may leave most of all.
     falls = [np.maximum(left, LEAST_LEFT) / floor for left, _, _ in tried]
@@ -97,7 +102,7 @@ def _best_of(model: MachineModel, log: Log, going: Sequence[str]) -> Recording |
 
 
 @dataclass(frozen=True, eq=False)
-class _Balance:
+class Balance:
     """The torque of one joint by test functions, (n,) each, N m or N.
 
     torque: as recorded. bodies: all that the bodies take, of which weight their weight. columns
@@ -126,6 +131,23 @@ class _Balance:
         whole = max(float(np.std(torque * self.torque)), float(np.std(self.bodies)))
         return float((left / (whole or 1.0)) ** 2) / len(asked)
 
+    def inertia(self) -> tuple[float, float]:
+        """Inertia, kg m^2 (kg), that the torque asks for beside bodies and rotor, and its error.
+
+        Between reversals: there a friction with a memory looks like an inertia that is less.
+        """
+        going = np.abs(self.columns[1]) > 0.999
+        asked = (self.torque - self.bodies)[going]
+        beside = np.vstack([self.columns, np.ones_like(self.torque)])[:, going].T
+        if len(asked) <= beside.shape[1]:
+            return 0.0, np.inf
+        gains = np.linalg.lstsq(beside, asked, rcond=None)[0]
+        others, of_others = beside[:, 1:], np.linalg.pinv(beside[:, 1:])
+        own = beside[:, 0] - others @ (of_others @ beside[:, 0])
+        overlap = 4.0  # test functions that hold each instant
+        noise = float(np.std(asked - beside @ gains)) * np.sqrt(overlap)
+        return float(gains[0]), noise / max(float(np.linalg.norm(own)), np.finfo(float).tiny)
+
     def ratio(self) -> float:
         """How many times the torque is what the bodies take, friction beside it."""
         from identify.estimation.least_squares import orthonormal, unabsorbed
@@ -135,7 +157,7 @@ class _Balance:
         return float(made @ bodies) / (float(bodies @ bodies) or 1.0)
 
 
-def _balances(model: MachineModel, log: Log, going: Sequence[str]) -> dict[str, _Balance]:
+def balances(model: MachineModel, log: Log, going: Sequence[str]) -> dict[str, Balance]:
     """By joint that moves, the balance of its torque."""
     from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
 
@@ -155,12 +177,12 @@ def _balances(model: MachineModel, log: Log, going: Sequence[str]) -> dict[str, 
         acceleration = w.acceleration(motion.velocity)
         rotor = model.axes[axis].weighed.mass - model.axes[axis].mass
         bodies = torque - net + (taken[axis].mass + rotor) * acceleration
-        out[axis] = _Balance(torque, bodies, own, np.stack([acceleration, way, speed]))
+        out[axis] = Balance(torque, bodies, own, np.stack([acceleration, way, speed]))
     return out
 
 
 def _of_torques(
-    model: MachineModel, plain: Mapping[str, _Balance], going: Sequence[str], asked: Sequence[str]
+    model: MachineModel, plain: Mapping[str, Balance], going: Sequence[str], asked: Sequence[str]
 ) -> Iterator[tuple[Array, Reader, str]]:
     """What is left of each joint where torques are others, with how it is read and told."""
     as_it_is = np.array([plain[a].left() for a in going])

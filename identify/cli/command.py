@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 from typer.core import TyperCommand
 
-from twin.errors import InputError
+from twin.errors import InputError, Unwritten
 from twin.files import is_same_file, require_writable
 from twin.parallel import Progress, silent
 
@@ -54,13 +54,26 @@ AS_JSON = inspect.Parameter(
 class Said:
     """What a command says: text or, with --json, the answer; warnings on standard error.
 
-    fine: whether the exit code is 0, else 1.
+    fine: whether the exit code is 0, else 1. unwritten: errors of files that could not be written
+    after all was computed; they come behind the text, with exit code 2.
     """
 
     text: str
     answer: Answer
     warnings: Sequence[str] = ()
     fine: bool = True
+    unwritten: Sequence[str] = ()
+
+
+def tried(*writes: Callable[[], object]) -> tuple[str, ...]:
+    """What of some files could not be written, an error each: an answer is told all the same."""
+    errors = []
+    for write in writes:
+        try:
+            write()
+        except Unwritten as error:
+            errors.append(str(error))
+    return tuple(errors)
 
 
 class Commands(typer.Typer):
@@ -79,7 +92,9 @@ class Commands(typer.Typer):
                 for warning in said.warnings:
                     print(f"twin: {warning}", file=sys.stderr)
                 print(json.dumps(said.answer.entries()) if as_json else said.text)
-                return 0 if said.fine else 1
+                for error in said.unwritten:
+                    print(f"twin: {error}", file=sys.stderr)
+                return 2 if said.unwritten else 0 if said.fine else 1
 
             parameters = [*own.parameters.values(), AS_JSON]
             run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -173,22 +188,28 @@ FIRST, EVERY = 5.0, 10.0  # s until the first line, and from one to the next
 
 @dataclass(frozen=True)
 class Progressed:
-    """Part of a command's work. first: how much of it was done when it began, at ``begun`` (s)."""
+    """Part of a command's work. first: how much of it was done when it began, at ``begun`` (s).
+
+    since: when as much as ``done`` was done, s.
+    """
 
     what: str
     done: int
     total: int
     first: int
     begun: float
+    since: float
 
     def left(self, now: float) -> float | None:
         """s until it ends, where the rest goes as fast as what was done; None where that is none.
 
-        What is under way is not counted, so the time grows where it takes longer than the others.
+        It only falls until more is done; None too where that takes longer than all of the rest.
         """
         if self.done <= self.first or self.done >= self.total:
             return None
-        return (now - self.begun) / (self.done - self.first) * (self.total - self.done)
+        each = (self.since - self.begun) / (self.done - self.first)
+        left = each * (self.total - self.done) - (now - self.since)
+        return left if left > 0.0 else None
 
     def words(self, now: float) -> str:
         """What is done, how much of it, and how long that still takes."""
@@ -213,13 +234,15 @@ class Shown:
 
     def __init__(self) -> None:
         self.begun = monotonic()
-        self.part = Progressed("starting", 0, 0, 0, self.begun)
+        self.part = Progressed("starting", 0, 0, 0, self.begun, self.begun)
 
     def __call__(self, what: str, done: int, total: int) -> None:
         same = what == self.part.what and total == self.part.total and done > self.part.done
         now = monotonic()
         self.part = (
-            replace(self.part, done=done) if same else Progressed(what, done, total, done, now)
+            replace(self.part, done=done, since=now)
+            if same
+            else Progressed(what, done, total, done, now, now)
         )
 
     def __str__(self) -> str:

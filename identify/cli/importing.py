@@ -55,7 +55,7 @@ def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
     """A log by the map of a user, with what its signals say against it."""
     from identify.output.answers.machine import LogAnswer
     from twin.checks import check_assumed
-    from twin.importers import import_log, load_mapping
+    from twin.importers import import_log, load_mapping, told_of
     from twin.importers.guess import doubts_of
     from twin.importers.proposal.doubts import told_in_log
     from twin.logs import write_log
@@ -66,10 +66,9 @@ def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
     doubts = told_in_log(log)  # for whoever checks it later
     write_log(replace(log, metadata={**log.metadata, **doubts}), out)
     answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
-    resampled = [v for k, v in log.metadata.items() if k.startswith("resampled")]
     told = (*doubts_of(known), *doubts.values())
     warnings = [
-        *resampled,
+        *told_of(log),
         *(f"{mapping}: warning: {doubt}" for doubt in told),
         *(f"{out}: warning: {finding}" for finding in unsure),
     ]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identify.cli.command import Said, progress_on_stderr, require_apart
+from identify.cli.command import Said, progress_on_stderr, require_apart, tried
 from identify.cli.shared import (
     CheckedRecordings,
     Done,
@@ -92,9 +92,9 @@ def fit(
         with progress_on_stderr() as progress:
             result = workflow.fit_simulation(done.result, progress=progress)
         alarms = objectives_in_words(result)
-    if out:
-        save_model(result.model, out)
-    return said_of(result, [*done.warnings, *alarms], left_out=done.left_out)
+    failed = tried(partial(save_model, result.model, out)) if out else ()
+    said = said_of(result, [*done.warnings, *alarms], left_out=done.left_out)
+    return replace(said, unwritten=failed)
 
 
 @app.command()
@@ -118,12 +118,15 @@ def compare(
     machine, _ = loaded(model, effects)
     job = partial(workflow.compare, test_function=test_function)
     done = with_logs(job, machine, logs)
+    writes: list[Callable[[], object]] = []
     if html:
         source = _source(model, test_function, effects)
-        _report(html, source, done, logs)
+        writes.append(partial(_report, html, source, done, logs))
     if mcap:
-        workflow.side_by_side_of(done.result).write(mcap)
-    return said_of(done.result, done.warnings, left_out=done.left_out)
+        writes.append(lambda: workflow.side_by_side_of(done.result).write(mcap))
+    failed = tried(*writes)
+    said = said_of(done.result, done.warnings, left_out=done.left_out)
+    return replace(said, unwritten=failed)
 
 
 @app.command()
@@ -154,12 +157,27 @@ def diagnose(
     source = replace(
         _source(model, test_function, effects), written=str(better) if better else None
     )
+    writes: list[Callable[[], object]] = []
     if html:
-        _report(html, source, done, logs)
+        writes.append(partial(_report, html, source, done, logs))
     if better:
-        _save_with_bodies(done.result.model, better, machine)
+        writes.append(partial(_save_with_bodies, done.result.model, better, machine))
+    failed = tried(*writes)
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
-    return Said(diagnose_text(done.result, source), answer, done.warnings)
+    text = diagnose_text(done.result, source)
+    warnings = [*done.warnings, *_of_rotors(machine, logs)]
+    return Said(text, answer, warnings, unwritten=failed)
+
+
+def _of_rotors(machine: MachineModel, logs: Sequence[Path]) -> list[str]:
+    """The rotors that the file of a mechanism states as before their gears."""
+    if not machine.joints:
+        return []
+    from identify.analysis.motor_rotor import rotors_before_gears
+    from identify.output.words.recording import rotor_in_words
+
+    first = Recordings(logs[:1])[str(logs[0])]
+    return [rotor_in_words(found, machine) for found in rotors_before_gears(machine, first)]
 
 
 def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
@@ -246,8 +264,9 @@ def add(
         call = adding.add_shape if shape else adding.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
     done: Done[Any] = with_logs(job, machine, logs, holdout, test, fits=True)
-    _save_with_bodies(done.result.model, out, machine)
-    return said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
+    failed = tried(partial(_save_with_bodies, done.result.model, out, machine))
+    said = said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
+    return replace(said, unwritten=failed)
 
 
 def _copy_of(machine: MachineModel, out: Path) -> Path:

@@ -19,6 +19,7 @@ from identify.cli.shared import (
     Recordings,
     app,
     loaded,
+    meaningless,
     was_kept,
     written,
 )
@@ -108,21 +109,24 @@ def new(
     Example: twin new run.mcap -o model.toml
     """
     from identify.analysis.first_model import first_model, not_determined, unused
+    from identify.analysis.motor_rotor import rotors_before_gears
     from identify.analysis.recording import misassigned
     from identify.output.answers.machine import NewModelAnswer
-    from identify.output.words.recording import recording_in_words
+    from identify.output.words.recording import recording_in_words, rotor_in_words
     from twin.effects import load_catalogue
     from twin.files import kept_beside
     from twin.model.file import format_model, read_mjcf, save_model
 
-    recorded = CheckedRecordings(logs)
+    recorded = CheckedRecordings(logs, refused=meaningless(() if mjcf is None else (mjcf.stem,)))
     bodies = None if mjcf is None else (mjcf.name, read_mjcf(mjcf))
     read, known = dict(recorded), _masses(mass or ())
     with recorded.explaining():
         model = first_model(read, name or out.stem, load_catalogue(), bodies, known)
     kept = kept_beside(out, format_model(model).encode())
     save_model(model, out)
-    doubt = misassigned(model, next(iter(read.values()))) if model.joints else None
+    first = next(iter(read.values()))
+    doubt = misassigned(model, first) if model.joints else None
+    rotors = [] if doubt else [*rotors_before_gears(model, first)]
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
     having: dict[str, list[str]] = {}
     for axis, labels in unknown.items():
@@ -133,13 +137,23 @@ def new(
         "no break away from rest takes more than Coulomb friction; it is set to that"
         for label, axes in having.items()
     ]
-    text = f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, logs[0])}`"
+    text = (
+        f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, *_in_roles(logs))}`"
+    )
     answer = NewModelAnswer.of(model=out, axes=list(model.axes), not_determined=unknown)
     doubts = [] if doubt is None else [f"{logs[0]}: warning: {recording_in_words(doubt)}"]
     silent = [f"{log} is left out: {why}" for log, why in unused(model, read).items()]
+    doubts += [rotor_in_words(found, model) for found in rotors]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
     return Said("\n".join([text, *notes]), answer, warnings)
+
+
+def _in_roles(logs: Sequence[Path]) -> list[object]:
+    """The logs as a diagnosis takes them: the last but one chooses, the last tests."""
+    *training, selection, test = [*logs, None, None][: max(len(logs), 3)]
+    roles = [("--holdout", selection), ("--test", test)]
+    return [*training, *(word for role, log in roles if log for word in (role, log))]
 
 
 def _masses(given: Sequence[str]) -> Masses | None:

@@ -181,6 +181,15 @@ class CheckedRecordings(Recordings):
             raise InputError(f"{known}; as it is, {error}") from error
 
 
+def meaningless(joints: Collection[str]) -> frozenset[str]:
+    """Names of the faults with which what is fitted has no meaning; joints: axes that are some.
+
+    Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
+    """
+    always = {"UNIT", "SWAPPED", "WRAPPED"}
+    return frozenset(always if joints else always | {"SIGN", "PARTIAL"})
+
+
 @dataclass(frozen=True)
 class Done(Generic[Result]):
     """What a job on logs gave. findings: on its first logs; left_out: those that say nothing."""
@@ -210,9 +219,7 @@ def with_logs(
 
     share_one_arena()
     every = [path for paths in (logs, *others) for path in paths or ()]
-    # Of a joint, which the others move, no mass of its own tells a sign: `twin new --mjcf` does.
-    meaningless = {"UNIT", "SWAPPED", "WRAPPED"} | (set() if model.joints else {"SIGN"})
-    recorded = CheckedRecordings(logs or (), every, meaningless if fits else ())
+    recorded = CheckedRecordings(logs or (), every, meaningless(model.joints) if fits else ())
     rest = (Recordings(paths or (), every) for paths in others)
     with progress_on_stderr() as progress, heard() as silent, recorded.explaining():
         result = job(model, recorded, *rest, progress=progress)

@@ -133,7 +133,7 @@ def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = No
         period=motions[0].period,
         force_max=force,
         force_usual=float(np.median(driven[speed >= slow])),
-        resolution=max(m.resolution for m in motions),
+        resolution=max(m.count for m in motions),
         shortest=max(_told(m) for m in motions),
         both_ways=_both_ways(np.concatenate([m.position for m in motions]), velocity, fast),
         temperature=_temperature(motions),

@@ -30,7 +30,15 @@ from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import MOST_AXES_OF_A_PAIR
 from twin.model.units import LINEAR, AxisUnits
-from twin.signals import Array, between, local_parabola, rate, usual_size, white_noise
+from twin.signals import (
+    Array,
+    between,
+    count_of,
+    local_parabola,
+    rate,
+    usual_size,
+    white_noise,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,16 +164,18 @@ class Motion:
     other axis (zero where there is none, or more than one), and with channels (6, n) these in SI.
     channels: fields of the log that are among these, such as "pressure"; others are zero. period:
     s, of a block. start: s, middle of the first block. sample_period: s, of the log.
-    position_noise: m rms. time_origin: s, when the log began, by the phase of what repeats in time.
-    follows: whether the position follows a logged setpoint; None where none was logged. units,
-    other_units: of the axis and of the other one, by which m, N and so on are to be read. beside:
-    on a machine with more than two axes the others, by name. velocity_weight: 1, of a measured
-    velocity beside the readings (identify.dataset.readings); 0 where there is none. ripples: m,
-    periods at which the readings err along the track (identify.dataset.readings). ahead: s, by
-    which the command was moved ahead of how it was logged, as_logged (n * samples a block,) N; None
-    where it was not. bodies: of a joint of a mechanism, over as many samples as raw; None for a
-    plain axis, whose mass is all that it moves. path: what laws with memory follow; None: the
-    readings as they are. slip: what a model moves such laws beside it at rest.
+    position_noise: m rms. count: m, of the encoder as logged, which a resampling or a measured
+    velocity takes out of the readings; 0 where none shows. time_origin: s, when the log began, by
+    the phase of what repeats in time. follows: whether the position follows a logged setpoint; None
+    where none was logged. units, other_units: of the axis and of the other one, by which m, N and
+    so on are to be read. beside: on a machine with more than two axes the others, by name.
+    velocity_weight: 1, of a measured velocity beside the readings (identify.dataset.readings); 0
+    where there is none. ripples: m, periods at which the readings err along the track
+    (identify.dataset.readings). ahead: s, by which the command was moved ahead of how it was
+    logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a joint of a
+    mechanism, over as many samples as raw; None for a plain axis, whose mass is all that it moves.
+    path: what laws with memory follow; None: the readings as they are. slip: what a model moves
+    such laws beside it at rest.
     """
 
     name: str
@@ -189,6 +199,7 @@ class Motion:
     path: Path | None = None
     slip: Slip | None = None
     channels: tuple[str, ...] = ()
+    count: float = 0.0
 
     def __repr__(self) -> str:
         return (
@@ -460,6 +471,7 @@ def motion_of(
         other_units=LINEAR if other is None else other.units,
         beside=found if several else {},
         position_noise=noise,
+        count=resolution_of(np.diff(readings)) or count_of(readings),
         follows=_follows(log.axes[axis]),
         velocity_weight=weight,
         ripples=ripples,

@@ -156,10 +156,16 @@ def minor(findings: Sequence[str]) -> list[str]:
 
 
 def briefly(findings: Sequence[str]) -> list[str]:
-    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them."""
+    """Findings on logs, the minor ones on each log in one line, as `twin check` tells them.
+
+    What the import map of several logs or axes assumes is said of the first of them.
+    """
     folded = minor(findings)
     counts = Counter(line.partition(": warning: ")[0] for line in folded)
-    return [line for line in findings if line not in folded] + [
+    told = [line for line in findings if line not in folded]
+    assumed = [line for line in told if ASSUMES in line]
+    first = [line for line in told if line not in assumed[1:]]
+    return first + [
         f"{log}: {n} warning{'s' if n > 1 else ''}; `{in_shell('check', log)}` tells what to do"
         for log, n in counts.items()
     ]

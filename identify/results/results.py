@@ -13,7 +13,8 @@ from identify.analysis.recording import Recording
 from identify.dataset.dataset import Dataset, Role, by_log
 from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
-from identify.estimation.fit import Errors, Fit, error_if_any, error_in
+from identify.estimation.evidence import rms
+from identify.estimation.fit import Errors, Fit, error_if_any, error_in, error_on
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.offered import NotTried
 from identify.estimation.simulated_motion import MotionFit
@@ -142,6 +143,21 @@ UNTOLD = OnMachine()
 
 
 @dataclass(frozen=True)
+class LogErrors:
+    """RMS force errors (N) in one log without what was found and with it.
+
+    seconds: that were looked at. floor: noise floor of the logs of its role, N.
+    """
+
+    name: str
+    role: Role
+    seconds: float
+    before: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True)
 class AxisSummary:
     """The final model of an axis, and how it differs from the one that was fitted before.
 
@@ -150,7 +166,7 @@ class AxisSummary:
     floors: noise floor of the final model on the logs of each role, N RMS, the only one that is
     told: of what is known to make noise, and never more than what the model leaves there. beyond:
     by role, error of the final model on logs that were not fitted, over all noise that they may
-    have. noise: the floor on the training logs with its parts.
+    have. noise: the floor on the training logs with its parts. by_log: the errors in each log.
     """
 
     before: tuple[Estimate, ...]
@@ -161,6 +177,7 @@ class AxisSummary:
     floors: Mapping[Role, float]
     beyond: Mapping[Role, float] = field(default_factory=dict)
     noise: NoiseFloor | None = None
+    by_log: tuple[LogErrors, ...] = ()
 
     @property
     def floor(self) -> float:
@@ -186,7 +203,21 @@ def summary_of(found: AxisDiagnosis) -> AxisSummary:
         floors=floors,
         beyond=beyond,
         noise=final.noise,
+        by_log=tuple(_errors_by_log(found, floors)),
     )
+
+
+def _errors_by_log(found: AxisDiagnosis, floors: Mapping[Role, float]) -> Iterator[LogErrors]:
+    base, final = found.base.axis, found.final.axis
+    for role in Role:
+        for log in found.dataset.having(role):
+            left = error_on(base, [log])
+            if not len(left):  # at rest, or where no training log has been
+                continue
+            before = rms(left)
+            after = before if final is base else rms(error_on(final, [log]))
+            seconds = len(log.motion.time) * log.motion.period
+            yield LogErrors(log.motion.name, role, seconds, before, after, floors[role])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_runs import refusal, twin
+from import_cases import write_csv
 from strict_json import valid
 
+from twin.errors import Unwritten
 from twin.importers import load_mapping
 from twin.logs import read_log
 
@@ -148,9 +150,56 @@ def test_an_import_says_what_its_signals_contradict(recording):
     assert "give the force or the position sign = -1" in done.stderr
 
 
+def test_an_import_by_a_map_says_what_its_clock_did(tmp_path):
+    micros = (2**32 - 5 * 10**5 + 1000 * np.arange(2000)) % 2**32
+    place = np.sin(0.006 * np.arange(2000))
+    write_csv(tmp_path / "a.csv", {"us": micros, "m": place, "N": 2.0 * np.cos(place)})
+    (tmp_path / "map.toml").write_text(
+        'time = {column = "us", unit = "us"}\n[axes.x]\n'
+        'position = {column = "m", unit = "m"}\nforce = {column = "N", unit = "N"}\n'
+    )
+    done = twin("import", "a.csv", "--map", "map.toml", "-o", "a.mcap", folder=tmp_path)
+    assert done.stdout == "a.mcap: 2000 samples at 1000 Hz\n"
+    assert "the roll-over of a counter of 32 bits is taken out" in done.stderr
+
+
+def test_nothing_is_fitted_to_a_force_that_works_on_friction(tmp_path):
+    """A part of the command, of which the feedforward of friction is missing, is no force."""
+    t = 0.002 * np.arange(4000)
+    place = 0.1 * np.sin(2.0 * t) + 0.03 * np.sin(7.0 * t)
+    speed = np.gradient(place, 0.002)
+    force = 5.0 * np.gradient(speed, 0.002) + 8.0 * speed - 1.0 * np.sign(speed)
+    write_csv(tmp_path / "a.csv", {"t": t, "m": place, "N": force})
+    (tmp_path / "map.toml").write_text(
+        'time = {column = "t", unit = "s"}\n[axes.x]\n'
+        'position = {column = "m", unit = "m"}\nforce = {column = "N", unit = "N"}\n'
+    )
+    done = twin("import", "a.csv", "--map", "map.toml", "-o", "a.mcap", folder=tmp_path)
+    assert "negative friction" in done.stderr
+    assert twin("check", "a.mcap", folder=tmp_path).returncode == 1
+    said = refusal("new", "a.mcap", "-o", "m.toml", folder=tmp_path)
+    assert "map the whole force; nothing is fitted to it" in said
+
+
 def test_what_cannot_be_proposed_is_refused_in_a_line(recording):
     folder = recording.parent
     assert "2 files; give one at a time" in refusal(
         "import", recording.name, recording.name, folder=folder
     )
     assert "give -o LOG" in refusal("import", recording.name, "--map", "m.toml", folder=folder)
+
+
+def test_on_a_disk_that_fills_meanwhile_the_answer_is_told_all_the_same(recording, monkeypatch):
+    def fills(_model, path):
+        raise Unwritten(f"{path}: cannot be written: No space left on device")
+
+    folder = recording.parent
+    assert twin("import", recording.name, "--yes", "-o", "a.mcap", folder=folder).stdout
+    assert twin("new", "a.mcap", "-o", "m.toml", folder=folder).returncode == 0
+    monkeypatch.setattr("twin.model.file.save_model", fills)
+    done = twin("fit", "m.toml", "a.mcap", "-o", "f.toml", folder=folder)
+    assert done.returncode == 2
+    assert "force error on the training logs" in done.stdout
+    assert (
+        done.stderr.splitlines()[-1] == "twin: f.toml: cannot be written: No space left on device"
+    )

@@ -20,7 +20,7 @@ from twin.checks.explain import (
 )
 from twin.checks.report import WHOLE, Fault, LogFinding, Severity
 from twin.logs.log import AxisLog
-from twin.signals import Array, median, stretches, usual_size, white_noise
+from twin.signals import Array, count_of, median, usual_size, white_noise
 
 PHYSICAL = 10e-3  # s of lag, what a slow drive may account for
 READINGS = ("position", "velocity", "current", "force")
@@ -386,28 +386,6 @@ def _are_whole(steps: Array, least: float) -> bool:
     few = steps[steps < 20.0 * least]  # of more, rounding adds up
     off = np.abs(few / (least or 1.0) - np.round(few / (least or 1.0)))
     return len(few) >= 5 and float(np.mean(off < 0.05)) > 0.9  # as of the ways of ``count_of``
-
-
-def count_of(signal: Array) -> float:
-    """One count of a signal that stays at some value, and goes by whole counts to the next.
-
-    It passes a few samples between, where it was resampled. 0 where no count shows.
-    """
-    first, last = stretches(np.diff(signal) != 0.0).T
-    passed_in = 4  # samples in which a count is passed
-    ways = np.abs(signal[last] - signal[first])[last - first <= passed_in]
-    ways = ways[ways > 0.0]
-    if len(ways) < 5:  # that tell one
-        return 0.0
-    # parts of the ways that may be less, as text far from 0 is coarser
-    one_count = (0.5, 0.25, 0.1)
-    for count in np.quantile(ways, one_count):
-        off = np.abs(ways / count - np.round(ways / count))
-        whole_way = 0.05  # of a count: how far a way may be off a whole one
-        whole = ways[(off < whole_way) & (ways > 0.5 * count)]
-        if whole.sum() > 0.9 * ways.sum():  # least part of the ways that are whole ones
-            return float(count)
-    return 0.0
 
 
 def held_samples(signal: Array, most: int = 20) -> int:

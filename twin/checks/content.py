@@ -17,6 +17,7 @@ from twin.signals import Array, stretches
 # Whoever knows it to be right takes the word away.
 ASSUMED = "ASSUMED"
 MAP = "import_map"  # entry of a log's metadata: the map as it was written
+PARTIAL = "partial."  # the same of an axis, "partial.x": a part of its force is missing for sure
 DOUBT = "doubt."  # the same of an axis, "doubt.x.0": what its signals say against the map
 COUNTER = "counter."  # such an entry of an axis' signal, "counter.x.current": that it begins again
 _TABLE = re.compile(r"\[axes\.\"?(\w+)\"?\]")
@@ -52,9 +53,7 @@ def _unchanging(axis: Axis) -> Iterator[LogFinding]:
     """Readings that are one value: of an axis at rest, of a constant force, of a dead channel."""
     columns = axis.log.columns
     flat = {n: c[0] for n, c in columns.items() if len(c) and np.all(c == c[0])}
-    told = {
-        n: f"{n} is {flat[n]:.6g} {axis.log.units[n]} throughout" for n in READINGS if n in flat
-    }
+    told = {n: f"{n} is {flat[n]:.6g} {axis.log.unit(n)} throughout" for n in READINGS if n in flat}
     if "position" in told:
         fault = Fault.WEAK_EXCITATION if "setpoint_position" in flat else Fault.FLAT
         remedy = "leave the axis out of the fit, or check that the channel was connected and mapped"
@@ -108,8 +107,10 @@ def check_assumed(axis: str, metadata: Mapping[str, str]) -> Iterator[LogFinding
             size = what.rpartition(" ")[2]
             remedy = f"give wraps = {size} for its {field} in the map and import again"
             yield LogFinding(Severity.ERROR, Fault.WRAPPED, axis, what, WHOLE, remedy)
+        said, _, remedy = what.partition(": ")[2].rpartition("; ")
+        if key == f"{PARTIAL}{axis}":
+            yield LogFinding(Severity.ERROR, Fault.PARTIAL, axis, said, WHOLE, remedy)
         if key.startswith(f"{DOUBT}{axis}."):
-            said, _, remedy = what.partition(": ")[2].rpartition("; ")
             yield LogFinding(Severity.WARNING, Fault.ASSUMED, axis, said, WHOLE, remedy)
     if found := assumptions(metadata.get(MAP, ""), axis):
         yield LogFinding(
@@ -195,6 +196,7 @@ def _directions(axis: Axis) -> Iterator[LogFinding]:
             "and the Coulomb friction cannot be told apart",
             "move both ways",
         )
+    yield from _strokes(axis, np.abs(axis.velocity) > creep * fastest)
     low, middle, high = np.quantile(np.abs(moving), (0.1, 0.5, 0.9))
     if high - low < 0.05 * middle:  # spread of the speeds as a part of their median
         yield axis.warning(
@@ -202,6 +204,22 @@ def _directions(axis: Axis) -> Iterator[LogFinding]:
             f"there is one speed only, {middle:.3g} {axis.log.kind.velocity}, so that the "
             "Coulomb and the viscous friction cannot be told apart",
             "add other speeds",
+        )
+
+
+def _strokes(axis: Axis, going: NDArray[np.bool_]) -> Iterator[LogFinding]:
+    """A log that rests but for a stroke or two: each value is told by these alone."""
+    few, part = 2, 0.5  # one each way; of the log, that a motion fills
+    strokes = stretches(going)
+    lasting = [b - a for a, b in strokes if (b - a) * axis.smoother.block > axis.smoother.length]
+    if 0 < len(lasting) <= few and going.mean() < part:
+        seconds = float(sum(lasting)) * axis.smoother.block
+        many = "one stroke" if len(lasting) == 1 else "two strokes"
+        yield axis.warning(
+            Fault.WEAK_EXCITATION,
+            f"the axis makes {many} only, of {seconds:.3g} s in all of {axis.duration:.4g} s, so "
+            f"that the {axis.log.kind.mass_name} and the viscous friction are weakly told",
+            "add strokes of other speeds",
         )
 
 
@@ -270,8 +288,10 @@ def off_course(signal: Array) -> Array:
 
 
 def check_saturation(axis: Axis) -> Iterator[LogFinding]:
-    """Saturation of the command."""
+    """Saturation of the command; a force that goes in steps has its extremes by itself."""
     force = axis.log.force
+    if _goes_in_steps(axis):
+        return
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
         if extreme == 0.0:  # a drive that is off
             continue
@@ -287,6 +307,21 @@ def check_saturation(axis: Axis) -> Iterator[LogFinding]:
                 "move more gently if the drive was at its limit, and record its actual force",
                 f"from {first:.6g} s",
             )
+
+
+def _goes_in_steps(axis: Axis) -> bool:
+    """Whether a force that follows no setpoint changes at few instants, and hardly between them.
+
+    A loop that is at its limit changes its force slowly where it is not.
+    """
+    if {"setpoint_position", "setpoint_velocity"} & axis.log.columns.keys():
+        return False
+    changes = np.abs(np.diff(axis.force))  # low-passed, m - 1
+    noise = 6.0 * axis.smoother.held_noise(axis.force_noise)  # a change of noise alone is less
+    changes[changes < max(noise, 1e-9 * float(np.ptp(axis.force)))] = 0.0
+    few, most = 0.1, 0.95  # of the blocks, in which that part of all changes is
+    largest = np.sort(changes)[::-1][: max(round(few * len(changes)), 1)]
+    return float(largest.sum()) >= most * float(changes.sum())
 
 
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:

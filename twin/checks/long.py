@@ -194,7 +194,7 @@ def log_info(path: str | Path) -> LogInfo:
                 ranges[axis, name] = min(low, float(column.min())), max(high, float(column.max()))
     axes = {}
     for axis, own in part.axes.items():
-        channels = tuple(Channel(n, own.units[n], *ranges[axis, n]) for n in own.columns)
+        channels = tuple(Channel(n, own.unit(n), *ranges[axis, n]) for n in own.columns)
         constant = own.force_constant
         stated = None if constant is None else (constant, own.kind("N/A"))
         axes[axis] = AxisInfo(own.kind.kind, channels, stated)

@@ -25,6 +25,7 @@ class Fault(Enum):
     ASSUMED = "the import map assumes something"
     UNIT = "a signal is in another unit"
     SIGN = "a signal is reversed"
+    PARTIAL = "a part of the force is missing"
     LAG = "one channel is late"
     MISSING = "samples are missing"
     STUCK = "the encoder stands still"

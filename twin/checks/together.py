@@ -1,4 +1,4 @@
-"""Logs that are checked together: one that differs from the others in rate, units, size or mass."""
+"""Logs that are checked together: one that differs from the others in rate, units or size."""
 
 from __future__ import annotations
 
@@ -52,27 +52,3 @@ def _between(axis: Axis, name: str, other: Axis) -> Iterator[tuple[Severity, Fau
     if near:
         what = f"it travels {own:.3g} {unit}, in {name} {its:.3g} {unit}: it looks like {near[0]}"
         yield warning, Fault.UNIT, what, MAP
-    elif ratio := _masses_apart(axis, other):
-        what = f"force and acceleration are as of {ratio:.3g} times the mass that {name} shows"
-        remedy = "check its force, or fit logs with another load apart"
-        yield warning, Fault.UNIT, what, remedy
-
-
-def _masses_apart(axis: Axis, other: Axis) -> float:
-    """The ratio of what both logs show of the mass; 0 where it is not told, or about the same."""
-    if not (_is_whole(axis) and _is_whole(other) and axis.moves and other.moves):
-        return 0.0
-    one, two = axis.dynamics, other.dynamics
-    told = all(fit.explains and fit.mass_matters and fit.mass for fit in (one, two))
-    ratio = one.mass / two.mass if told and one.mass and two.mass else 1.0
-    about = 1.5  # times the other, up to which so rough a mass is the same
-    return ratio if ratio > 0.0 and not 1.0 / about < ratio < about else 0.0
-
-
-def _is_whole(axis: Axis) -> bool:
-    """Whether the log has a force and is long enough for a regression."""
-    columns = axis.log.columns
-    driven = "force" in columns or ("current" in columns and axis.log.force_constant)
-    finite = all(np.isfinite(c).all() for c in columns.values())
-    shortest = 0.5  # s, least duration for identification
-    return bool(driven) and finite and axis.duration > shortest

@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from twin.errors import InputError
+from twin.importers.table import MOST_NAMED
 
-MOST_NAMED = 100  # cells in one answer; more than anybody corrects by hand
 _COMMENTS = ("#", "%", "//", "!")
 
 
@@ -39,6 +39,7 @@ class BadCells:
         self._names = names
         self._width = width
         self._cells: list[tuple[Row, int]] = []
+        self._not_finite: list[tuple[Row, int]] = []
         self._headers: list[int] = []
         self._rows = 0
         self._bad_rows: list[tuple[int, Row, bool]] = []  # index, row, whether any cell is good
@@ -63,6 +64,10 @@ class BadCells:
         """A cell is not what it must be."""
         self._cells.append((row, column))
         self._bad_here += 1
+
+    def add_not_finite(self, row: Row, column: int) -> None:
+        """A cell is a NaN, which is told beside others that are bad."""
+        self._not_finite.append((row, column))
 
     def end_row(self, row: Row, read: Sequence[int]) -> None:
         """All cells of a row were looked at."""
@@ -99,6 +104,7 @@ class BadCells:
         cells = [(row, k) for row, k in self._cells if row.line not in rows]
         if not cells:
             return
+        cells = sorted(cells + self._not_finite, key=lambda cell: (cell[0].line, cell[1]))
         told = [self._told(row, k) for row, k in cells[:MOST_NAMED]]
         if len(told) == 1:
             raise InputError(f"{told[0]}{_remedy(cells[0][0].cell(cells[0][1]))}")

@@ -19,6 +19,7 @@ from twin.importers.clock import find_clock
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.proposal.axes import axes_of
+from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
 from twin.importers.proposal.forces import exchanged, with_force
 from twin.importers.proposal.names import names_of, unit_of, units_of
@@ -168,7 +169,8 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
         axis = replace(axis, comes_round=file.column(position.name).wraps is not None)
     if "position" not in axis.signals:
         return axis.asking({"force": f"axis {name}: {_NO_MOTION}"})
-    return exchanged(file, with_force(file, with_setpoints(file, with_rates(file, axis))))
+    moved = exchanged(file, with_force(file, with_setpoints(file, with_rates(file, axis))))
+    return with_channels(file, moved)
 
 
 _NO_MOTION = "without a position no column is known to be the force that moves it"

@@ -216,7 +216,7 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     times: Array | None = None
     holes = [hole for n, column in columns.items() if (hole := table.hole(n, column))]
     if holes and (mapping.resample is None or mapping.time is None):
-        raise InputError(holes[0])
+        raise InputError("; ".join(holes))
     for axis, field, c in mapping.signals():
         found = find_wraps(columns[c.name])
         if c.wraps is None and found is not None:

@@ -90,6 +90,34 @@ class _Series:
     parts: array = field(default_factory=lambda: array("q"))
     stamps: set[str] = field(default_factory=set)
     aliases: dict[str, tuple[int, str]] = field(default_factory=dict)
+    plain: dict[tuple[str, ...], list[array | None]] = field(default_factory=dict)
+
+    def add_plain(self, message: Mapping[str, Any], time: int, part: int) -> bool:
+        """Take a message of numbers alone as one before it was taken; False where none was so."""
+        targets = self.plain.get(tuple(message))
+        if targets is None:
+            return False
+        try:
+            values = array("d", message.values())
+        except (TypeError, OverflowError):
+            return False
+        count = len(self.times)
+        if any(t is not None and len(t) != count for t in targets):
+            return False
+        for target, value in zip(targets, values, strict=True):
+            if target is not None:
+                target.append(value)
+        self.times.append(time)
+        self.parts.append(part)
+        return True
+
+    def know_plain(self, message: Mapping[str, Any], values: Values) -> None:
+        """Remember where the values of such a message went, if each is a number of its own."""
+        names = [f"{self.prefix}.{key}" for key in message]
+        numbers = all(type(value) in (int, float) for value in message.values())
+        if numbers and values.keys() <= {*names} and not self.stamps:
+            own = {*values}
+            self.plain[tuple(message)] = [self.columns[n] if n in own else None for n in names]
 
     def add(self, values: Values, time: int, part: int) -> None:
         """Take a message's numbers; what it lacks is not a number."""
@@ -158,6 +186,9 @@ class Messages:
             number = self._publishers[topic]
             series = _Series(topic if number == 1 else f"{topic}#{number}")
             self._series[publisher] = series
+        is_dict = type(message) is dict
+        if is_dict and series.add_plain(message, time, part):
+            return
         aliases: Aliases = {}
         values = of_message(series.prefix, message, (), aliases)
         series.require_order(aliases, self.wanted)
@@ -168,6 +199,8 @@ class Messages:
             for key in aliases:  # who has names needs no numbers, which may be others' ones
                 values.pop(key, None)
         series.add(values, time, part)
+        if is_dict:
+            series.know_plain(message, values)
 
     def table(self, lost: Sequence[str], unread: Sequence[str]) -> SignalTable:
         """The columns that are wanted; raises InputError where one is missing.

@@ -34,6 +34,12 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             columns |= _flat(f"{name}.", value, names)
+        elif _are_messages(value):
+            rows = [dict(_leaves("", row)) for row in value]
+            for k in dict.fromkeys(k for row in rows[:1] + rows[-1:] for k in row):
+                columns[f"{name}.{k}" if prefix else k] = np.array(
+                    [row.get(k, np.nan) for row in rows]
+                )
         elif _is_of_rows(value):
             above = f"{name}." if prefix or sum(map(_is_of_rows, content.values())) > 1 else ""
             for k in value[0]:
@@ -64,6 +70,29 @@ def _are_all(kind: type, value: Any) -> bool:
 def _is_of_rows(value: Any) -> bool:
     """Whether it is a table as a list of rows, each with the names of the columns."""
     return _are_all(dict, value) and not _has_arrays(value[0])
+
+
+def _are_messages(value: Any) -> bool:
+    """Whether it is a list of many alike tables of single values, in tables within them."""
+    many = 20  # no recording of so few samples is of use, and no machine has so many signals
+    if not _are_all(dict, value) or len(value) < many or _is_of_rows(value):
+        return False
+    return all(len(list(_leaves("", row))) == len(dict(_leaves("", value[0]))) for row in value[:2])
+
+
+def _leaves(prefix: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The single values in a table and in those within it, by the keys that lead to them."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(f"{prefix}{key}.", value)
+        elif isinstance(value, list):
+            for number, entry in enumerate(value, 1):
+                if isinstance(entry, Mapping):
+                    yield from _leaves(f"{prefix}{key}[{number}].", entry)
+                else:
+                    yield f"{prefix}{key}[{number}]", entry
+        else:
+            yield f"{prefix}{key}", value
 
 
 def _has_arrays(table: Mapping[str, Any]) -> bool:

@@ -26,6 +26,7 @@ from twin.logs.log import Array
 from twin.numbers import first_not_finite
 
 _REAL = int | float | np.integer | np.floating
+MOST_NAMED = 100  # cells in one answer; more than anybody corrects by hand
 SMALLEST_TABLE = 1 << 27  # bytes, whatever the size of the file
 
 
@@ -62,9 +63,19 @@ class SignalTable:
         line = "" if self.first_line is None else f" (line {self.first_line + k})"
         return (
             f"column '{name}' is {values[k]} in row {k + 1} of {len(values)}{line}, "
-            f"{np.count_nonzero(~np.isfinite(values))} in all; complete or cut out such rows, or "
-            "leave the signal out of the map"
+            f"{self._others(values)}; complete or cut out such rows, or leave the signal out of "
+            "the map"
         )
+
+    def _others(self, values: Array) -> str:
+        """How many values (n,) are none, and the lines, or rows, of those behind the first."""
+        bad = np.flatnonzero(~np.isfinite(values))
+        behind = bad[1 : MOST_NAMED + 1] + (1 if self.first_line is None else self.first_line)
+        if not len(behind):
+            return "1 in all"
+        what = f"{'row' if self.first_line is None else 'line'}{'s' if len(behind) > 1 else ''}"
+        more = " and more" if len(bad) > MOST_NAMED + 1 else ""
+        return f"{len(bad)} in all, also in {what} {', '.join(map(str, behind))}{more}"
 
     def _message(self, name: str, row: int) -> str | None:
         """Which message of a bag a row is; None where the table is of none."""

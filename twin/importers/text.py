@@ -12,9 +12,10 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 from operator import methodcaller
 from pathlib import Path
 from typing import TextIO
@@ -25,15 +26,18 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.importers.bad_cells import BadCells, Row
 from twin.importers.mapping import ImportMap
+from twin.importers.proposal.lexicon import words_of_the_far_east
 from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
 from twin.importers.table import SignalTable, chosen
 
-ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".prn")
 HEAD = 1 << 16  # bytes in which a dialect is known and its first row is found
 _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")
 )  # fmt: skip
+_SECONDS = {"sec": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "hr": 3600.0}
+_WITH_UNIT = re.compile(rf"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s+({'|'.join(_SECONDS)})")  # of MATLAB
 _ENDS = re.compile(r"\r\n|\r|\n")
 
 
@@ -45,17 +49,23 @@ class Style:
     decimal: str
 
     def cells(self, line: str) -> list[str]:
-        """The cells of a line; one that begins with # has no other first cell for that."""
-        text = line.strip(" \r\n").removeprefix("#").strip(" ")
+        """The cells of a line; one that begins with # or % has no other first cell for that."""
+        text = line.strip(" \r\n").removeprefix("#").removeprefix("%").strip(" ")
         if self.delimiter is None:
             return text.split()
+        if '"' not in text:  # of a million lines nearly all
+            return [cell.strip() for cell in text.split(self.delimiter)] if text else []
         return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
 
     def value(self, cell: str) -> float:
         """The number in a cell, which may group its thousands; raises ValueError."""
         try:
-            return float(cell.replace(self.decimal, "."))
+            return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
         except ValueError:
+            if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
+                return self.value(re.sub("[dD]", "e", cell))
+            if (found := _WITH_UNIT.fullmatch(cell)) is not None:
+                return self.value(found[1]) * _SECONDS[found[2]]
             other = "." if self.decimal == "," else ","
             if not re.fullmatch(rf"[-+]?\d{{1,3}}([{other}'’ \xa0]\d{{3}})+([.,]\d+)?", cell):
                 raise
@@ -128,8 +138,22 @@ def _encoding(head: bytes) -> str:
     try:
         head[: head.rfind(b"\n") + 1].decode("utf-8")
     except UnicodeDecodeError:
-        return "cp1252"  # what programs on Windows write where it is not UTF-8
+        return _of_windows(head[: head.rfind(b"\n") + 1])
     return "utf-8"
+
+
+def _of_windows(head: bytes) -> str:
+    """What programs on Windows write where it is not UTF-8: in which words of recorders are there.
+
+    Of the Far East one in which such words are found; else that of the West.
+    """
+    found = {}
+    for encoding in ("shift_jis", "gb18030", "big5", "cp949"):
+        with suppress(UnicodeDecodeError):
+            text = head.decode(encoding)
+            found[encoding] = sum(len(word) for word in words_of_the_far_east() if word in text)
+    best = max(found, key=lambda encoding: found[encoding], default="cp1252")
+    return best if found.get(best) else "cp1252"
 
 
 @dataclass(frozen=True)
@@ -286,8 +310,10 @@ def _row_by_row(
             for k in where:
                 cell = cells[k] if k < len(cells) else ""
                 try:
-                    columns[k].append(stamps[k].add(cell) if k in stamps else
-                                      layout.style.value(cell))  # fmt: skip
+                    value = stamps[k].add(cell) if k in stamps else layout.style.value(cell)
+                    columns[k].append(value)
+                    if not isfinite(value):
+                        bad.add_not_finite(row, k)
                 except ValueError:
                     bad.add(row, k)
                     columns[k].append(-1 if k in stamps else np.nan)

@@ -57,6 +57,10 @@ class AxisLog:
         """The units of a linear or of a rotary axis, whichever the log states."""
         return units_of(self.units.get("position"))
 
+    def unit(self, field: str) -> str:
+        """The unit of a field: the stated one, else that of such an axis."""
+        return self.units.get(field) or (ROTARY_UNITS if self.kind.rotary else LINEAR_UNITS)[field]
+
     @property
     def position(self) -> Array:
         """(n,) encoder reading in m."""
@@ -114,7 +118,7 @@ class Log:
     def table(self) -> dict[str, Array]:
         """Columns (n,) by signal and unit, as "x position [m]", the time first; for pandas, say."""
         signals = {
-            f"{name} {signal} [{axis.units[signal]}]": column
+            f"{name} {signal} [{axis.unit(signal)}]": column
             for name, axis in self.axes.items()
             for signal, column in axis.columns.items()
         }

@@ -41,6 +41,15 @@ def stated_in(model: MachineModel) -> dict[str, dict[str, float]]:
     return stated(model.mjcf or "", model.mjcf_name or "", model.joints) if model.joints else {}
 
 
+def gear_in(model: MachineModel, axis: str) -> float:
+    """The gear of the motor of a joint in the file of a machine; 1 where it has none."""
+    built = read_bodies(model.mjcf or "", model.mjcf_name or "").compile()
+    joint = mujoco.mj_name2id(built, mujoco.mjtObj.mjOBJ_JOINT, model.joints[axis])
+    of_joints = built.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    own = np.flatnonzero(of_joints & (built.actuator_trnid[:, 0] == joint))
+    return float(built.actuator_gear[own[0], 0]) if joint >= 0 and len(own) else 1.0
+
+
 @lru_cache(maxsize=4)  # of one model it is asked several times
 def _stated(text: str, name: str, joints: tuple[str, ...]) -> list[dict[str, float]]:
     try:

@@ -24,6 +24,7 @@ from identify.output.words.fit import (
     correlation_in_words,
     place_in_words,
 )
+from identify.results.results import LogErrors
 from identify.rules import RULE
 from identify.validation.comparison import AxisComparison
 from identify.validation.free_run import HORIZON
@@ -159,6 +160,8 @@ def _correlation(test: Correlation) -> Chart:
 def logs(view: AxisView) -> list[Block]:
     """A row for each log: force on the measured motion, position when the model runs freely."""
     axis, words = view.axis, view.words
+    if view.summary is not None and view.summary.by_log:
+        return [_of_all_logs(view, view.summary.by_log)]
     force = DisplayUnit.of(view.units.force, list(axis.force_error.values()))
     position = DisplayUnit.of(view.units.position, list(axis.position_error.values()))
     durations = {log.motion.name: len(log.motion.time) * log.motion.period for log in axis.logs}
@@ -179,3 +182,29 @@ def logs(view: AxisView) -> list[Block]:
         "drifts with every wrong force, measurement noise included."
     )
     return [TableBlock.of(axis.force_error, columns, words(caption))]
+
+
+def _of_all_logs(view: AxisView, errors: Sequence[LogErrors]) -> TableBlock:
+    """The logs of a diagnosis in each role, without what was found and with it."""
+    axis, words = view.axis, view.words
+    sizes = [size for e in errors for size in (e.before, e.after)]
+    force = DisplayUnit.of(view.units.force, sizes)
+    position = DisplayUnit.of(view.units.position, list(axis.position_error.values()))
+    without = f", without {view.label}" if view.label else ""
+    columns: dict[str, Callable[[LogErrors], str]] = {
+        "Log": lambda e: e.name,
+        "Role": lambda e: e.role.value,
+        "Duration": lambda e: quantity(e.seconds, "s"),
+        words(f"Force error{without}"): lambda e: force.text(e.before),
+    }
+    if view.label:
+        columns[words(f"With {view.label}")] = lambda e: force.text(e.after)
+    columns["Times noise floor"] = lambda e: number(e.after / e.floor)
+    columns["Position, free run"] = lambda e: position.text(axis.position_error.get(e.name))
+    columns["Expected from noise"] = lambda e: position.text(axis.position_floor.get(e.name))
+    caption = (
+        f"RMS. The free run, of training logs alone{without}, restarts from the measured motion "
+        f"every {HORIZON:g} s; between restarts the position drifts with every wrong force, "
+        "measurement noise included."
+    )
+    return TableBlock.of(errors, columns, words(caption))

@@ -86,7 +86,7 @@ def fitted_curves() -> list[str]:
 def next_commands(found: AxisDiagnosis, plan: Plan | None = None) -> list[str]:
     """What to run next, of MODEL and LOG...: of what is named first, else of what is left.
 
-    plan: that of the diagnosis, where there is one; what it does not decide no plan is run for.
+    plan: that of the diagnosis, where there is one; none is run for what it is not known to decide.
     """
     if found.verdict is Verdict.NOTHING_MISSING:
         return []
@@ -97,7 +97,8 @@ def next_commands(found: AxisDiagnosis, plan: Plan | None = None) -> list[str]:
         f"twin plan MODEL LOG... --axis {found.dataset.axis} --between {finding.effect} "
         f"{finding.tied[0]} -o next.toml"
         for finding in found.missing
-        if finding.tied and (plan is None or plan.decides)
+        if finding.tied and plan is not None and plan.decides
+        if {finding.effect, finding.tied[0]} <= set(plan.between)
     ]
     return [*plans[:1], WRITE]
 
@@ -157,9 +158,9 @@ def _rival(t: SimulatedExperiment) -> str:
 
 def next_step_in_words(plan: Plan) -> str:
     """The experiment that an ambiguous diagnosis asks for, in one paragraph."""
-    what = "decides" if plan.decides else "comes nearest to deciding, but is too short"
+    what = "decides (twin plan writes it)" if plan.decides else "comes nearest, but is too short"
     return (
-        f"The experiment that {what} (twin plan writes it): {_run(plan.chosen)}. There "
+        f"The experiment that {what}: {_run(plan.chosen)}. There "
         f"{_rival(plan.chosen)}; {gap_in_words(plan.gap)}."
     )
 

@@ -33,6 +33,8 @@ from identify.estimation.force_balance import averaged_force, residual, unbalanc
 from identify.workflow import fit
 from twin.effects import load_catalogue
 from twin.errors import InputError
+from twin.knee import Imitated
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel
 from twin.mujoco.mechanism import mechanism_of
 from twin.signals import local_parabola
@@ -351,3 +353,20 @@ def test_a_fit_of_joints_holds_little_beside_their_log_and_its_signals_come_back
         motion.forget()
         for name, values in before.items():
             np.testing.assert_array_equal(getattr(motion, name), values)
+
+
+def test_the_count_of_an_encoder_outlasts_a_resampling():
+    """Straight lines between uneven samples of a coarse encoder hide its count, not from this."""
+    rng = np.random.default_rng(2)
+    uneven = np.cumsum(rng.uniform(0.004, 0.007, 1500))
+    even = np.arange(uneven[0], uneven[-1], 0.005)
+    counted = np.round(0.5 * np.sin(2.0 * uneven) / 0.006) * 0.006
+    x = np.interp(even, uneven, counted)
+    own = AxisLog({"position": x, "force": np.cos(2.0 * even)})
+    motion = motion_of(Log(200.0, {"x": own}), "x", "a")
+    assert motion.count == pytest.approx(0.006, rel=0.01)
+    covered = excitation([motion], None)
+    law = load_catalogue()["dahl"]
+    fine = {**law.starts(), "Fc": 1.0, "sigma0": 1.0 / 0.004}  # a reach of two thirds of a count
+    assert law.imitation(fine, covered).of is Imitated.DRY_FRICTION
+    assert law.imitation({**fine, "sigma0": 1.0 / 0.01}, covered) is None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from browser import Browser, browser
 from report_cases import Case
@@ -208,3 +211,35 @@ def test_five_logs_of_a_million_and_a_half_samples(case: Case, tmp_path: Path) -
         assert running.errors == []
     assert path.stat().st_size < 3_000_000
     assert min(paints) < 1.0
+
+
+def test_a_spike_is_beyond_the_range_on_which_the_charts_open(
+    shown: tuple[Browser, Path], tmp_path: Path
+) -> None:
+    """One test function that is far off all others hides none of them, and is told."""
+    running, path = shown
+    text = path.read_text(encoding="utf-8")
+    found = re.search(r'(<script[^>]*id="signals"[^>]*>)(.*?)(</script>)', text, re.S)
+    assert found is not None
+
+    def written(name: str, spike: bool) -> Path:
+        signals = json.loads(found[2])
+        for signal in signals[0]["signals"]:
+            if signal["name"] in signals[0]["residuals"]:
+                values = np.frombuffer(base64.b64decode(signal["data"]), "<i2").copy()
+                there = values != -32768
+                values[there] //= 8  # smaller, so that there is room for a spike
+                values[np.flatnonzero(there)[100]] = 32000 if spike else 0
+                signal["data"] = base64.b64encode(values.tobytes()).decode()
+        (tmp_path / name).write_text(text.replace(found[2], json.dumps(signals)), encoding="utf-8")
+        return tmp_path / name
+
+    script = """const y = id => document.getElementById(id).shown.scales.y.max;
+      return [y("coordinate"), y("left"), text("coordinate-note")];"""
+    running.open(written("usual.html", False))
+    usual = running.run(script)
+    running.open(written("spiked.html", True))
+    opened = running.run(script)
+    assert opened[:2] == pytest.approx(usual[:2], rel=2.0)  # three times what is usual
+    assert re.search(r"\d+ dots are beyond, from .* to ", opened[2])
+    assert "beyond" not in usual[2]

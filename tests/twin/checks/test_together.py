@@ -26,7 +26,6 @@ def other(**of):
         (other(rate=500.0), "sampled at 500 Hz, a.mcap at 1000 Hz", Severity.WARNING),
         (other(kind=ROTARY_UNITS), "it is rotary, in a.mcap linear", Severity.ERROR),
         (other(factor={"position": 1e3, "force": 1e3}), "mm for m", Severity.WARNING),
-        (other(factor={"force": 2.0}), "as of 2 times the mass", Severity.WARNING),
     ],
 )  # fmt: skip
 def test_a_log_that_differs_is_told(tmp_path, log, said, severity):

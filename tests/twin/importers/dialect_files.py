@@ -150,6 +150,9 @@ SAMPLES = {
     "halsampler": Sample(
         "a.txt", text(lambda k: f"{k} {Q[k]:f} {F[k]:f} ", ""), "2", "3", asks=True
     ),
+    "labelled": Sample(
+        "a.log", text(lambda k: f"t:{T[k]:.3f},pos:{Q[k]},u:{F[k]}", "boot"), "pos", "u",
+    ),
     "klipper": Sample(
         "a.csv", text(lambda k: f"{T[k]:.6f},{Q[k]:.6f},{F[k]:.6f},0.000000",
                       "#time,accel_x,accel_y,accel_z"), "accel_x", "accel_y",

@@ -98,8 +98,8 @@ def spoiled(line: bytes) -> bytes:
     delimiter = next(d for d in (b"\t", b';"', b",", b" ") if d in line.rstrip())
     delimiter = b";" if delimiter == b';"' else delimiter
     first, *cells = line.rstrip(b"\r\n").split(delimiter)
-    fraction = re.compile(rb"-?\d*[.,]\d+")
-    return delimiter.join([first, *(b"#REF!" if fraction.fullmatch(c) else c for c in cells)])
+    fraction = re.compile(rb"^(\w+:|)-?\d*[.,]\d+$")
+    return delimiter.join([first, *(fraction.sub(rb"\1#REF!", c) for c in cells)])
 
 
 @pytest.mark.parametrize("name", [n for n, sample in SAMPLES.items() if not sample.is_text])

@@ -17,6 +17,8 @@ from mcap_bytes import of
 
 from twin.errors import InputError
 from twin.importers import import_log, told_of
+from twin.importers.importer import table_of
+from twin.importers.mapping import EVERY_COLUMN
 from twin.logs import Log
 from twin.logs.topics import instant
 
@@ -214,3 +216,62 @@ def test_times_since_1970_are_shown_as_dates(tmp_path):
     text = map_of("q", "q", clock="t in s")
     with pytest.raises(InputError, match=r"between 2023-11-14 22:13:20\.199 UTC and 2023"):
         imported(tmp_path, "a.csv", text)
+
+
+LVM = (
+    "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t,\n***End_of_Header***\n\n"
+    "Channels\t2\nSamples\t400\t400\nDate\t2024/05/03\t2024/05/03\nX_Dimension\tTime\tTime\n"
+    "Delta_X\t0,002\t0,002\n***End_of_Header***\nX_Value\tWeg (mm)\tKraft (N)\tComment\n"
+)
+
+
+def rows(form: str, decimal: str = ".") -> str:
+    time, force = 0.002 * np.arange(400), np.cos(5.0 * 0.002 * np.arange(400))
+    lines = (form.format(t, 30.0 * np.sin(3.0 * t), f) for t, f in zip(time, force, strict=True))
+    return "".join(lines).replace(".", decimal)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "position"),
+    [
+        ("a.lvm", LVM + rows("{:.6f}\t{:.6f}\t{:.5f}\n", ","), "Weg (mm)"),
+        ("a.dat", "%   t   y_mm   F\n" + rows(3 * "{:16.8E}" + "\n").replace("E", "D"), "y_mm"),
+        ("a.jsonl", rows('{{"t": {:.4f}, "axis": {{"pos": {:.6f}, "u": {:.5f}}}}}\n'), "axis.pos"),
+        ("a.log", "boot\n" + rows("t: {:.4f} s, pos: {:.6f} mm, u: {:.5f}\n"), "pos [mm]"),
+    ],
+    ids=["names wider than rows", "a mark before the names", "a table a line", "labels"],
+)  # fmt: skip
+def test_files_of_other_tools_are_read(tmp_path, name, text, position):
+    """A block of settings above the names, Fortran's exponents, JSON lines, a serial plotter."""
+    (tmp_path / name).write_text(text)
+    table = table_of(tmp_path / name, EVERY_COLUMN)
+    np.testing.assert_allclose(
+        table.columns[position], 30.0 * np.sin(0.006 * np.arange(400)), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("encoding", "names", "position"),
+    [
+        ("gb18030", "时间(ms),实际位置(mm),电机电流(A)", "实际位置(mm)"),
+        ("shift_jis", "時間[s],位置フィードバック[mm],トルク[%]", "位置フィードバック[mm]"),
+        ("cp1252", "Zeit [s],Lage für Übung [mm],Kraft [N]", "Lage für Übung [mm]"),
+        ("utf-8", "Time [s],位置[mm],F [N]", "位置[mm]"),
+    ],
+)
+def test_the_encoding_is_the_one_in_which_its_words_are_known(tmp_path, encoding, names, position):
+    text = f"{names}\n" + rows("{:.4f},{:.6f},{:.5f}\n")
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    assert position in table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
+
+
+def test_names_between_a_title_and_units_and_times_with_a_unit_in_each_cell(tmp_path):
+    """As of IndraDrive, whose first name is left out, and of MATLAB's timetables."""
+    (tmp_path / "a.csv").write_text(
+        "Oszilloskop;;;\n;Lage-Istwert;Kraft-Istwert;\n[ms];[mm];[N];\n"
+        + rows("{:.4f};{:.6f};{:.5f};\n", ",")
+    )
+    assert "Lage-Istwert [mm]" in table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
+    (tmp_path / "b.csv").write_text("Time,q,u\n" + rows("{:.4f} sec,{:.6f},{:.5f}\n"))
+    columns = table_of(tmp_path / "b.csv", EVERY_COLUMN).columns
+    np.testing.assert_allclose(columns["Time"], 0.002 * np.arange(400), atol=1e-9)

@@ -52,7 +52,12 @@ MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
          {"x": {"position": "pos [mm]", "force": "force [N]",
                 "setpoint_position": "ref_pos [mm]"}}, ""),
         ({"t": T, "qm": Q, "qg": Q + 1e-6 * NOISE, "vir": F, "temp": NOISE},
-         {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir"}}, ""),
+         {"x": {"position": "qm", "setpoint_position": "qg", "force": "vir",
+                "temperature": "temp"}}, 'temperature = {column = "temp", unit = "degC"}'),
+        ({"t": T, "Weg [mm]": 1e3 * Q, "Kraft [N]": F, "p_A [bar]": 4.0 + 0.01 * F,
+          "Druck B [bar]": 4.0 - 0.01 * F, "Versorgungsdruck max [bar]": 6.0 + 0.1 * NOISE},
+         {"x": {"position": "Weg [mm]", "force": "Kraft [N]", "pressure": "p_A [bar]",
+                "pressure_2": "Druck B [bar]"}}, ""),
         ({"Time": 1.7e9 + T, "xPos_mm": 1e3 * Q, "yPos_mm": 1e3 * V, "xCurrent_A": F,
           "yCurrent_A": NOISE},
          {"x": {"position": "xPos_mm", "current": "xCurrent_A"},
@@ -338,7 +343,9 @@ def test_a_hole_in_a_column_that_is_used_is_named_and_hides_nothing(tmp_path):
     write_csv(tmp_path / "a.csv", columns)
     found = guess_map(tmp_path / "a.csv")
     (what,) = found.missing
-    assert what.startswith("column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all; ")
+    assert what.startswith(
+        "column 'pos_mm' is nan in row 41 of 4000 (line 42), 2 in all, also in line 52; "
+    )
     assert columns_of(found.text) == {"x": {"position": "pos_mm", "force": "force_N"}}
 
 
@@ -350,3 +357,13 @@ def test_units_below_the_names_are_read(tmp_path):
     assert text.count("ASSUMED") == 1  # in the first line, of what is to be corrected
     log = import_log(tmp_path / "a.csv", mapping(tmp_path, text))
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
+
+
+def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tmp_path):
+    """A setpoint that comes later than its position is none by the numbers."""
+    later = np.concatenate([np.zeros(2), REACHED[:-2]])
+    columns = {"t": T, "Position measured": REACHED, "Setpoint": later, "force [N]": PUSH}
+    write_csv(tmp_path / "a.csv", columns)
+    text = guess_map(tmp_path / "a.csv").text
+    assert "which of both is measured ASSUMED" in text
+    assert "which of both is asked for ASSUMED" in text

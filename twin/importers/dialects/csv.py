@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 _UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
+_WITHOUT_CELLS = 2  # names at the end, such as LabVIEW's comment, that rows may have no cell of
 _SOME = 40  # rows by which the kinds of the columns are told
 
 Rows = Sequence[Sequence[str]]
@@ -39,14 +41,13 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     style = head.style(stated)
     rows = [style.cells(line) for line in head.lines]
     if style.delimiter is None:  # names may be of several words
-        lines = (re.sub(r"^\s*#", "", line).strip() for line in head.lines)
+        lines = (re.sub(r"^\s*[#%]", "", line).strip() for line in head.lines)
         spaced = [re.split(r"\s{2,}|\t", line) for line in lines]
     else:
         spaced = rows
     width = _width(rows)
     counting = _counting(rows, width, style)
-    skip = _first_row(rows, counting, style, stated.header_line)
-    header = _header(rows, spaced, skip, stated.header_line)
+    skip, header = _top(rows, spaced, counting, style, stated.header_line)
     if header is not None:  # a row with a bad cell is one, too
         between = range(header + 1, skip)
         skip = next((k for k in between if _good(rows[k], counting, style)), skip)
@@ -54,9 +55,29 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     if header is None:
         names: tuple[str, ...] = tuple(str(k + 1) for k in range(width))
         return Layout(head.encoding, style, names, skip, some)
-    names = _names(rows[header] if len(rows[header]) == width else spaced[header], rows[skip])
+    plain = len(rows[header]) >= width or style.delimiter is not None
+    names = _names(rows[header] if plain else spaced[header], rows[skip])
     units = _units(rows[header + 1 : skip], names)
     return Layout(head.encoding, style, names, skip, some, units, header)
+
+
+def _top(
+    rows: Rows, spaced: Rows, counting: Sequence[int], style: Style, header_line: int | None
+) -> tuple[int, int | None]:
+    """Index of the first row of numbers and of that with the names, None where there is none.
+
+    Lines of numbers above the names, as of a block of settings, are passed by: where the first line
+    that may be a row is none in all its cells, one that is, below names, is taken.
+    """
+    skip = _first_row(rows, counting, style, header_line)
+    if header_line is None and _good(rows[skip], counting, style) < len(counting):
+        whole = [k for k in range(skip, len(rows)) if _good(rows[k], counting, style)
+                 == len(counting)]  # fmt: skip
+        with suppress(InputError):
+            named = whole and _header(rows, spaced, whole[0], None)
+            if named and named > skip:
+                return whole[0], named
+    return skip, _header(rows, spaced, skip, header_line)
 
 
 def _width(rows: Rows) -> int:
@@ -108,15 +129,19 @@ def _header(rows: Rows, spaced: Rows, skip: int, header_line: int | None) -> int
             )
         return top
     near = range(skip - 1, max(skip - 6, -1), -1)  # names, units, types, descriptions, an empty one
-    fitting = [k for k in near if {len(rows[k]), len(spaced[k])} & set(_widths(rows[skip]))]
-    for k in fitting:
-        row = rows[k] if len(rows[k]) in _widths(rows[skip]) else spaced[k]
+    widths = set(_widths(rows[skip]))
+    fitting = [k for k in near if {len(rows[k]), len(spaced[k])} & widths]
+    wider = {width + more for more in range(1, _WITHOUT_CELLS + 1)}
+    for k in near:
+        if k not in fitting and len(rows[k]) not in wider:
+            continue
+        row = spaced[k] if len(spaced[k]) in widths else rows[k]
         filled = [cell for cell in row if cell]
         if len(filled) >= width - 1 and len(set(filled)) == len(filled) and _is_names(filled):
             return k
     named = [k for k in fitting if any(re.search(r"\w", cell) for cell in rows[k])]
-    if named:
-        return named[-1]
+    if named:  # the one with most names, of like ones the first
+        return max(named, key=lambda k: (_count_of_names(rows[k]), -k))
     above = next((rows[k] for k in near if any(rows[k])), [])
     if len(above) > 1:
         raise InputError(
@@ -132,6 +157,12 @@ def _widths(row: Sequence[str]) -> tuple[int, ...]:
     return (len(row), len(row) - 1) if not row[-1] or dated else (len(row),)
 
 
+def _count_of_names(cells: Sequence[str]) -> int:
+    """How many of some cells are words, and no units."""
+    words = (cell for cell in cells if re.search(r"[^\W\d_]", cell))
+    return sum(not is_usual_unit(cell.strip("[]() ")) for cell in words)
+
+
 def _is_names(cells: Sequence[str]) -> bool:
     """Whether cells are names, and neither units nor numbers nor a line that is drawn."""
     units = sum(is_usual_unit(cell.strip("[]() ")) for cell in cells)
@@ -141,7 +172,7 @@ def _is_names(cells: Sequence[str]) -> bool:
 
 def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
     """The names of all columns: of those without one their numbers."""
-    names = list(header)
+    names = list(header)[: len(row)]
     if len(names) < len(row) and row[-1]:
         place = next(k for k, cell in enumerate(row) if is_date(cell))
         names.insert(place, "date")

@@ -1,4 +1,4 @@
-"""JSON: arrays by name, a matrix, one object a row, or tables within tables.
+"""JSON: arrays by name, a matrix, one object a row or a line, or tables within tables.
 
 The columns of a matrix are ``name[1]``, ``name[2]``, ...; a list of as many names beside it names
 them.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
@@ -19,7 +20,7 @@ from twin.importers.table import SignalTable, chosen, parsing
 def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a JSON file; raises InputError."""
     with parsing("JSON"):
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = _content(path.read_text(encoding="utf-8-sig"))
         columns = flat(content if isinstance(content, dict) else {ROWS: content})
     wanted = mapping.column_names()
     if not wanted and (found := recordings_of(columns)):
@@ -31,4 +32,15 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
     return SignalTable({name: columns[name] for name in chosen(wanted, columns)})
 
 
-DIALECT = Dialect("JSON", (".json",), read)
+def _content(text: str) -> Any:
+    """What a text holds: one value, or one a line (https://jsonlines.org)."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        lines = [line for line in text.splitlines() if line.strip()]
+        if len(lines) < 2 or (error.lineno == 1 and not text.startswith("{")):
+            raise
+        return [json.loads(line) for line in lines]
+
+
+DIALECT = Dialect("JSON", (".json", ".jsonl", ".ndjson"), read)

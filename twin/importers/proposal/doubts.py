@@ -9,6 +9,12 @@ from twin.importers.proposal.motion import Explained, explained
 from twin.importers.proposal.units import near
 from twin.logs.log import AxisLog, Log
 
+DOUBT, PARTIAL = "doubt.", "partial."  # entries of a log's metadata, which a check reads
+PUSHES = (
+    "the force helps the motion where friction resists it (negative friction); a part of the "
+    "command is missing in this column, such as its feedforward; map the whole force"
+)
+
 
 def motion_of_force(axis: AxisLog) -> Explained | None:
     """What the motion of an axis explains of its force or current; None where it has neither."""
@@ -24,15 +30,22 @@ def doubts_of_log(log: Log) -> Iterator[str]:
 def told_in_log(log: Log) -> dict[str, str]:
     """The same as entries of the log's metadata, "doubt.x.0", which a check reads.
 
-    Of an axis whose counter begins again that is told, and nothing else is.
+    "partial.x" where a part of the force of an axis is missing for sure: it does work on friction,
+    which the others of a machine with several may do. Of an axis whose counter begins again that is
+    told, and nothing else is.
     """
     counted = {key.split(".")[1] for key in log.metadata if key.startswith("counter.")}
-    return {
-        f"doubt.{name}.{number}": doubt
+    found = {
+        f"{DOUBT}{name}.{number}": doubt
         for name, axis in log.axes.items()
         if name not in counted
         for number, doubt in enumerate(_of_axis(name, axis))
     }
+    alone, *others = log.axes
+    motion = None if others else motion_of_force(log.axes[alone])
+    if motion is not None and motion.is_partial:
+        found = {f"{PARTIAL}{alone}" if PUSHES in d else key: d for key, d in found.items()}
+    return found
 
 
 def _of_axis(name: str, axis: AxisLog) -> Iterator[str]:
@@ -64,10 +77,7 @@ def _of_force(motion: Explained, sign: int) -> Iterator[str]:
             f"reversed {percent(motion.backward)}; give the force or the position sign = -1"
         )
     elif motion.pushes:
-        yield (
-            "the force helps the motion where friction resists it (negative friction); a part of "
-            "the command is missing in this column, such as its feedforward; map the whole force"
-        )
+        yield PUSHES
 
 
 def _of_setpoint(position: Column, setpoint: Column, force: Column, sign: int) -> Iterator[str]:

@@ -209,6 +209,16 @@ def exchanged(file: File, axis: Axis) -> Axis:
         why = f"rougher and later than {setpoint.column}, as a reading is"
         return axis.having(position.told(why, Certainty.SURE))
     least = min(others, key=lambda n: votes[n.column], default=None)
+    if (
+        setpoint is not None
+        and votes[setpoint.column] == -1
+        and _is_later(file, position, setpoint)
+    ):
+        why = f"although {setpoint.column} is later, as a reading is"
+        return axis.having(
+            replace(position.told(why, Certainty.UNSURE), assumed="which of both is measured"),
+            replace(setpoint, certainty=Certainty.UNSURE, assumed="which of both is asked for"),
+        )
     if least is None or votes[least.column] > -2:
         named = position.name.quantity is not None
         sure = named and axis.motion is not None and axis.motion.explains
@@ -219,6 +229,12 @@ def exchanged(file: File, axis: Axis) -> Axis:
         Signal("position", least, Certainty.UNSURE, (why,)),
         Signal("setpoint_position", position.name, Certainty.UNSURE, ("exchanged",)),
     )
+
+
+def _is_later(file: File, position: Signal, setpoint: Signal) -> bool:
+    """Whether what is called a setpoint comes later than the position, which none does."""
+    found = file.course(position.name, setpoint.name)
+    return found is not None and found.behind < 0.0
 
 
 def _votes(file: File, axis: Axis, position: Name, other: Name) -> int:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum, auto
+from functools import cache
 
 
 class Quantity(Enum):
@@ -18,7 +19,12 @@ class Quantity(Enum):
     FORCE = auto()
     CURRENT = auto()
     DRIVE = auto()  # what may stand for a force: a voltage, a duty cycle, the output of a loop
-    OTHER = auto()  # no signal of an axis: an error, a temperature, a limit, a time
+    PRESSURE = auto()
+    TEMPERATURE = auto()
+    OTHER = auto()  # no signal of an axis: an error, a limit, a time
+
+
+CHANNELS = (Quantity.PRESSURE, Quantity.TEMPERATURE)  # beside the motion and its force
 
 
 class Role(Enum):
@@ -34,28 +40,34 @@ QUANTITIES: Mapping[Quantity, str] = {
         position positions pos displacement disp distance travel stroke angle angles ang theta
         rotation extension elongation coordinate deflection crosshead qpos jpos
         winkel weg lage stellung hub auslenkung traverse deplacement course
+        posicion posizione angulo angolo desplazamiento spostamento recorrido corsa carrera
         位置 位移 角度 转角 行程 変位 变位 ポジション ストローク 回転角 座標 坐标""",
     Quantity.VELOCITY: """
         velocity velocities vel velo speed speeds spd rpm erpm qd dq qdot qvel omega vitesse
-        geschwindigkeit geschw drehzahl 速度 转速 回転数 回転速度 角速度""",
+        geschwindigkeit geschw drehzahl velocidad velocita 速度 转速 回転数 回転速度 角速度""",
     Quantity.ACCELERATION: """
         acceleration accelerations accel acc qdd ddq qddot beschleunigung beschl 加速度 角加速度""",
     Quantity.FORCE: """
         force forces torque torques trq tq tau effort efforts thrust moment kraft drehmoment
+        fuerza forza coppia momento esfuerzo sforzo spinta empuje
         momenten couple poussee frc 力 力矩 转矩 扭矩 推力 トルク 荷重""",
     Quantity.CURRENT: """
-        current currents curr cur crnt amps ampere iq isq strom courant intensite 电流 電流""",
+        current currents curr cur crnt amps ampere iq isq strom courant intensite
+        corriente corrente 电流 電流""",
     Quantity.DRIVE: """
         pwm duty voltage volt volts spannung tension ctrl 电压 電圧""",
+    Quantity.PRESSURE: "pressure pressures press druck pression presion pressione 压力 圧力",
+    Quantity.TEMPERATURE: """
+        temperature temperatures temperatur temperaturen temperatura temp 温度""",
     Quantity.OTHER: """
         error err ferr ferror deviation difference diff lag following schleppfehler schleppabstand
         fehler regeldifferenz abweichung erreur ecart droop 误差 偏差 誤差 jerk ruck
-        temperature temperatur temp 温度 power leistung puissance 功率 電力 energy
-        limit limits max min maximum minimum supply bus vbus battery humidity pressure druck
-        pression 压力 圧力 mode fault faults enable enabled activated trigger flag flags alarm
+        power leistung puissance 功率 電力 energy
+        limit limits max min maximum minimum supply bus vbus battery humidity
+        barometric barometer mode fault faults enable enabled activated trigger flag flags alarm
         word bit bits code checksum crc id index count counter frame seq line row sample gain
         covariance frequency phase tool payload friction gravity coriolis noise
-        time times timestamp stamp temps zeit clock date datum uhrzeit 时间 時間""",
+        time times timestamp stamp temps zeit tiempo tempo clock date datum uhrzeit 时间 時間""",
 }
 
 # Words that tell a quantity where none of those above does.
@@ -75,11 +87,14 @@ ROLES: Mapping[Role, str] = {
         demand demanded dmd command commands commanded cmd cmptd computed goal goals
         requested request req nominal nom wanted planned plan trajectory traj profile
         programmed prog input action control soll sollwert vorgabe fuhrungsgrosse
-        consigne cons commande cible 指令 目标 目標 设定 設定 给定 期望 命令""",
+        consigne cons commande cible consigna comandada comandata comandato mando referencia
+        riferimento objetivo obiettivo deseada desiderata
+        指令 目标 目標 设定 設定 给定 期望 命令""",
     Role.MEASURED: """
         actual act measured meas measure mes mesure mesuree feedback fb fbk fdb fdbk present pv
         real reel reelle readback reading sensor est estimate estimated observation obs monitor ist
         istwert gemessen mess messwert
+        medida medido misurata misurato attuale reale effettiva lectura lettura
         实际 实测 反馈 当前 現在 実際 実測 実 フィードバック 測定""",
     Role.PART: """
         ff feedforward fwd ffw pid vorsteuerung comp compensation integral integrator additive
@@ -89,6 +104,13 @@ ROLES: Mapping[Role, str] = {
 
 def _set(words: str) -> frozenset[str]:
     return frozenset(words.split())
+
+
+@cache
+def words_of_the_far_east() -> frozenset[str]:
+    """Those of several signs that are not Latin."""
+    words = " ".join((*QUANTITIES.values(), *ROLES.values()))
+    return frozenset(w for w in words.split() if len(w) > 1 and ord(w[0]) > 0x2E7F)
 
 
 SMOOTHED = _set("filtered filt smoothed sm avg averaged lowpass lp gefiltert")
@@ -213,16 +235,23 @@ UNITS: Mapping[Quantity, Mapping[str, str]] = {
     },
     Quantity.CURRENT: {"A": "arms aeff apk amp amps ampere a_rms", "mA": "marms", "uA": "µa μa"},
     Quantity.DRIVE: {"V": "volt volts", "mV": "", "%": "percent pct prozent"},
+    Quantity.PRESSURE: {
+        "bar": "",
+        "mbar": "",
+        "Pa": "",
+        "hPa": "",
+        "kPa": "",
+        "MPa": "",
+        "psi": "psig psia",
+    },
+    Quantity.TEMPERATURE: {"degC": "°c ℃ c degc celsius", "K": "kelvin"},
     Quantity.OTHER: {
         "s": "sec secs second seconds sekunden 秒",
         "ms": "msec milliseconds millis",
         "us": "µs μs usec micros microseconds",
         "ns": "",
-        "degC": "°c ℃ c degc celsius",
-        "K": "",
         "W": "watt",
         "kW": "",
         "Hz": "khz mhz",
-        "bar": "mbar kpa mpa pa psi",
     },
 }

@@ -64,10 +64,20 @@ class Explained:
     @property
     def pushes(self) -> bool:
         """Whether the force helps the motion where friction resists it: a part of it is missing."""
-        most = 0.5  # of what is left
         told = 0.1  # of the force
+        against = self.both_ways and self.explains and self.friction < -told
+        return against or self.is_partial
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether it does so for sure: friction below 0 is all that is left, and enough of it.
+
+        A drag that grows with the square of the speed looks like it too, and leaves more.
+        """
+        all_but = 0.9  # of what is left
+        enough = 1e-3  # of the squared force
         told_of = self.both_ways and self.explains
-        return told_of and (self.helps > most or self.friction < -told)
+        return told_of and self.helps > all_but and self.free - self.forward > enough
 
     @property
     def explains(self) -> bool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from twin.importers.proposal.lexicon import (
+    CHANNELS,
     CODES,
     COUNTING,
     EMPTY,
@@ -251,6 +252,8 @@ def _quantity(words: Sequence[str]) -> tuple[Quantity | None, bool]:
     said = _quantities(words)
     if Quantity.OTHER in said:
         return Quantity.OTHER, True
+    if channel := next((q for q in CHANNELS if q in said), None):
+        return channel, True
     others = [q for q in said if q is not Quantity.CURRENT]
     if Quantity.CURRENT in said and others and others[-1] is not Quantity.DRIVE:
         return _rate_of(others[-1], words), True  # the current position: that of now
@@ -276,7 +279,7 @@ def _with_unit(
     may = units_of(written)
     own = [u for q, u in may if q is quantity]
     bracketed = column.rstrip().endswith(("]", ")", ">", "}"))
-    if quantity is Quantity.OTHER:
+    if quantity is Quantity.OTHER or (quantity in CHANNELS and not own and not _is_raw(may)):
         return quantity, None, True
     if own:
         return quantity, own[0], True
@@ -292,9 +295,14 @@ def _with_unit(
         Quantity.VELOCITY,
         Quantity.FORCE,
         Quantity.CURRENT,
+        *CHANNELS,
     ):
         return quantity, unit, True
     return of, unit, True
+
+
+def _is_raw(may: Sequence[tuple[Quantity, str]]) -> bool:
+    return bool(may) and may[0][1] in RAW
 
 
 def _role(words: Sequence[str], quantity: Quantity | None) -> Role | None:
@@ -304,7 +312,7 @@ def _role(words: Sequence[str], quantity: Quantity | None) -> Role | None:
     if Role.PART in said and quantity in (Quantity.FORCE, Quantity.CURRENT):
         return Role.PART
     by_letter = last in ("d", "r") and bool(_ASKED_BY_A_LETTER & set(first))
-    if Role.ASKED in said or (by_letter and quantity is not Quantity.OTHER):
+    if Role.ASKED in said or (by_letter and quantity not in (Quantity.OTHER, *CHANNELS)):
         return Role.ASKED
     return Role.MEASURED if Role.MEASURED in said or current else None
 

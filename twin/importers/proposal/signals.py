@@ -22,13 +22,17 @@ class Certainty(Enum):
 
 @dataclass(frozen=True)
 class Signal:
-    """A column that is taken for a signal. sign: -1 where it is reversed."""
+    """A column that is taken for a signal.
+
+    sign: -1 where it is reversed. assumed: what its name says and the numbers deny; empty: nothing.
+    """
 
     field: str
     name: Name
     certainty: Certainty
     reasons: tuple[str, ...]
     sign: int = 1
+    assumed: str = ""
 
     @property
     def column(self) -> str:

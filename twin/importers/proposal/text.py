@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from twin.importers.proposal.channels import SI, channel_unit
 from twin.importers.proposal.courses import Column
 from twin.importers.proposal.lexicon import Quantity
 from twin.importers.proposal.signals import Axis, File, Signal
@@ -27,7 +28,7 @@ from twin.importers.proposal.units import (
 from twin.importers.units import is_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
-ORDER = ("position", "velocity", "setpoint_position", "setpoint_velocity", "force", "current")
+ORDER = ("position", "velocity", "setpoint_position", "setpoint_velocity", "force", "current", *SI)
 CONSTANT = "force_constant"
 SCALE, UNIT = "scale", "unit"
 TURN, METRE = "counts_per_turn", "counts_per_metre"
@@ -83,7 +84,9 @@ class Entry:
         why = ", ".join(self.signal.reasons)
         span = f"{column.values.min():.4g} to {column.values.max():.4g}"
         jumps = () if column.wraps is None else (f"jumps back by {column.wraps:.6g}: it wraps",)
-        told = "; ".join((f"{self.signal.certainty.value}: {why}", span, *jumps, *self.remarks))
+        assumed = (f"{self.signal.assumed} ASSUMED",) if self.signal.assumed else ()
+        sure = f"{self.signal.certainty.value}: {why}"
+        told = "; ".join((sure, span, *jumps, *assumed, *self.remarks))
         return f"{self.signal.field} = {{{table}}} # {told}"
 
     def answered(self, answers: Answers) -> Entry:
@@ -116,7 +119,16 @@ def _entry(file: File, axis: Axis, signal: Signal) -> Entry:
         return _of_setpoint(file, axis, signal)
     if signal.field.endswith("velocity"):
         return _of_velocity(file, axis, signal)
+    if signal.field in SI:
+        return _of_channel(file, axis, signal)
     return _of_drive(file, axis, signal)
+
+
+def _of_channel(file: File, axis: Axis, signal: Signal) -> Entry:
+    unit, stated = channel_unit(signal, file.column(signal.name))
+    if is_raw(unit):
+        return _without_scale(axis, signal, unit, SI[signal.field])
+    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
 
 
 def _of_position(file: File, axis: Axis, signal: Signal) -> Entry:

@@ -16,6 +16,13 @@ const extent = values => {
   for (const v of values) if (v != null) { if (v < low) low = v; if (v > high) high = v; }
   return low > high ? [0, 1] : [low, high];
 };
+// A few spikes would leave nothing to be seen of all else: then the range is three times that of 90 % of the values.
+const usual = values => {
+  const sorted = Float64Array.from(values.filter(v => v != null)).sort(), at = p => sorted[Math.round(p * (sorted.length - 1))];
+  if (!sorted.length) return [0, 1];
+  const [first, low, high, last] = [0, 0.05, 0.95, 1].map(at), width = high - low;
+  return width > 0 && last - first > 5 * width ? [Math.max(first, low - width), Math.min(last, high + width)] : [first, last];
+};
 const padded = (low, high) => {
   const more = 0.05 * (high - low) || Math.abs(low) || 1;
   return [low - more, high + more];
@@ -159,8 +166,12 @@ if (data.length) {
       series: series().map(([name, color, width], i) => line(title(name), color, to.unit, {width, show: boxes[i].checked}))},
       [x, ...series().map(([name]) => shown(name))]));
     const band = {drawClear: [u => rectangle(u, null, null, -axis.floor, axis.floor, FLOOR)]};
+    const [least, most] = usual(axis.residuals.flatMap(name => axis.values(name)));
     plots.push(plot($("left"), {...common, hooks: {...hooks, ...band}, height: 230, labels: ["", `${axis.texts.residual} (${left.unit})`],
-      scales: {y: {range: (u, low, high) => padded(Math.min(low ?? 0, -axis.floor), Math.max(high ?? 0, axis.floor))}},
+      scales: {y: {range: (u, low, high) => {
+        const view = u.scales.x, all = view.min == null || view.min <= x[0] && view.max >= x[x.length - 1];
+        return padded(Math.min(Math.max(low ?? 0, all ? least : -Infinity), -axis.floor), Math.max(Math.min(high ?? 0, all ? most : Infinity), axis.floor));
+      }}},
       series: axis.residuals.map((name, i) => line(title(name), [BEFORE, AFTER][i], left.unit))},
       [x, ...axis.residuals.map(name => axis.values(name))]));
     motion(common, hooks);
@@ -225,7 +236,7 @@ if (data.length) {
       : what === "force" ? series().slice(0, series().length - axis.effects.length) : series().filter(s => s[0] === what);
     const unit = axis.of(what === "residual" ? "before" : "to_explain").unit;
     const dots = group.map(([name]) => shown(name)), speed = axis.values("velocity");
-    const xs = x.slice(a, b), [low, high] = extent(xs), reach = extent(dots.flatMap(d => extent(d.slice(a, b))));
+    const xs = x.slice(a, b), [low, high] = extent(xs), every = dots.flatMap(d => d.slice(a, b)), reach = usual(every), ends = extent(every);
     const floor = what === "residual" ? axis.floor : 0;
     const sides = $("apart").checked ? [["forwards", i => speed[i] > 0, []], ["backwards", i => speed[i] < 0, [6, 4]]] : [["", () => true, []]];
     const lines = [], values = [];
@@ -236,7 +247,8 @@ if (data.length) {
       values.push([null, ...mean, null]);
       lines.push(line(`mean ${title(name)}${side && ", " + side}`, color, unit, {width: 2.25, dash, spanGaps: false}));
     }));
-    const bounds = padded(Math.min(reach[0], -floor), Math.max(reach[1], floor));
+    const middle = extent(values.flat()), bounds = padded(Math.min(reach[0], middle[0], -floor), Math.max(reach[1], middle[1], floor));
+    const beyond = every.filter(v => v != null && (v < bounds[0] || v > bounds[1])).length;
     const u = plot($("coordinate"), {
       height: 390, labels: [label(along), `${what === "residual" ? axis.texts.residual : axis.texts.force} (${unit})`],
       x: {label: along.label, value: withUnit(along.unit)}, series: lines, cursor: {drag: {x: true, y: true, uni: 12}},
@@ -257,6 +269,7 @@ if (data.length) {
     }, [[low, ...at, high === low ? low + 1 : high], ...values]);
     $("coordinate-note").textContent = `Dots: single test functions of ${where}; lines: their means. `
       + (floor ? `Grey: ${axis.texts.band}.` : "")
+      + (beyond ? ` ${beyond} dots are beyond, from ${digits(ends[0])} to ${digits(ends[1])} ${unit}; over time, a part that is chosen shows its own.` : "")
       + (axis.every > 1 ? ` Of every ${axis.every} test functions one and the extremes are shown.` : "");
     return u;
   }
