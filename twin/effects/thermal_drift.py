@@ -45,7 +45,7 @@ EFFECT = Effect(
             scan=lambda e: tuple(e.duration * part for part in (0.05, 0.2, 0.7, 3.0)),
         ),
         Parameter(
-            "idle", "N m/s", 1.0, LEAST, MOST, "heat that comes without friction",
+            "idle", "N m/s", 0.01, LEAST, MOST, "heat that comes without friction",
             start_rule=lambda e: e.dry_level * e.speed_max,
         ),
     ),

@@ -200,7 +200,8 @@ def _of_all_logs(view: AxisView, errors: Sequence[LogErrors]) -> TableBlock:
     if view.label:
         columns[words(f"With {view.label}")] = lambda e: force.text(e.after)
     columns["Times noise floor"] = lambda e: number(e.after / e.floor)
-    columns["Position, free run"] = lambda e: position.text(axis.position_error.get(e.name))
+    runs = axis.position_error
+    columns[words("Position, free run")] = lambda e: position.text(runs.get(e.name))
     columns["Expected from noise"] = lambda e: position.text(axis.position_floor.get(e.name))
     caption = (
         f"RMS. The free run, of training logs alone{without}, restarts from the measured motion "
