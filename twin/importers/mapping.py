@@ -8,8 +8,8 @@
     force = {column = "drive", unit = "V", scale = 35.15}     # N a volt; or scale = "gtau"
     gear = 32.0                           # the columns are those of a motor, 32 turns for one
 
-A counter has unit = "counts" with counts_per_turn or counts_per_metre, and where it begins again
-wraps, such as 65536.
+A counter has unit = "counts" with counts_per_turn or counts_per_metre, of its own or of its axis,
+and where it begins again wraps, such as 65536.
 
 Several files are given in the order of [[files]] tables, each with time or sample_rate and an
 offset (s) that is added to its times; a column of the second one says file = 2.
@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from twin.entries import Entries, read_entries, toml_document
 from twin.errors import InputError, at
@@ -38,6 +38,7 @@ from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
 
 NUMBER = "a finite number"
+PER_ENCODER = ("counts_per_turn", "counts_per_metre")
 AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
 
 
@@ -140,16 +141,15 @@ class ColumnMap(_Column):
 
     def _per_count(self, field: str) -> Unit | None:
         """One of its counts in SI, where an encoder tells; None where the map has none."""
-        per = {"counts_per_turn": self.counts_per_turn, "counts_per_metre": self.counts_per_metre}
-        given = {name: counts for name, counts in per.items() if counts is not None}
+        given = {name: c for name in PER_ENCODER if (c := getattr(self, name)) is not None}
         if not given:
             return None
         name, counts = next(iter(given.items()))
         si = (ROTARY_UNITS if name == "counts_per_turn" else LINEAR_UNITS)[field]
         if len(given) > 1 or not self.is_counted or field in ("current", "force"):
             raise InputError(
-                f"{name} = {counts:g}: give one of {' and '.join(per)}, of a position or velocity "
-                'with unit = "counts" (or "counts/s")'
+                f"{name} = {counts:g}: give one of {' and '.join(PER_ENCODER)}, of a position or "
+                'velocity with unit = "counts" (or "counts/s")'
             )
         if "scale" in self.model_fields_set:
             raise InputError(f"scale and {name} are both given; give one of them")
@@ -185,6 +185,12 @@ class AxisMap(Entries):
         description='"motor" or "load": on which side of the gear position and velocity are '
         "measured; current and force are the motor's, unless a column says its own side",
     )
+    counts_per_turn: float | None = Field(
+        None, gt=0.0, description="a number above 0: of each signal in counts that has none itself"
+    )
+    counts_per_metre: float | None = Field(
+        None, gt=0.0, description="a number above 0: of each signal in counts that has none itself"
+    )
     setpoint_position: ColumnMap | None = _SIGNAL
     setpoint_velocity: ColumnMap | None = _SIGNAL
     setpoint_acceleration: ColumnMap | None = _SIGNAL
@@ -195,6 +201,21 @@ class AxisMap(Entries):
     pressure: ColumnMap | None = _SIGNAL
     pressure_2: ColumnMap | None = _SIGNAL
     temperature: ColumnMap | None = _SIGNAL
+
+    @model_validator(mode="after")
+    def _by_one_encoder(self) -> AxisMap:
+        """What the axis says of its encoder holds for each of its signals in counts."""
+        known = {n: v for n in PER_ENCODER if (v := getattr(self, n)) is not None}
+        if not known:
+            return self
+        own = {"scale", *PER_ENCODER}
+        told = {
+            field: column.model_copy(update=known)
+            for field, column in self.columns.items()
+            if column.is_counted and field not in ("current", "force")
+            and not own & column.model_fields_set
+        }  # fmt: skip
+        return self.model_copy(update={**told, **dict.fromkeys(PER_ENCODER)}) if told else self
 
     @property
     def columns(self) -> dict[str, ColumnMap]:
@@ -220,6 +241,11 @@ class AxisMap(Entries):
         for field, column in self.columns.items():
             with at(field):
                 column.require_unit(field)
+        if idle := [n for n in PER_ENCODER if getattr(self, n) is not None]:
+            raise InputError(
+                f"{idle[0]}: none of the axis' signals is in counts without a scale of its own; "
+                'give one unit = "counts", or remove the entry'
+            )
         if "position" not in self.columns or not {"current", "force"} & set(self.columns):
             raise InputError("an axis needs position and one of current and force; map both")
         if self.gear in ({}, 0.0):

@@ -42,9 +42,18 @@ def test_counts_of_a_turn_and_of_a_metre_and_a_second(tmp_path):
     np.testing.assert_allclose(axis.position, 1e-6 * COUNTS)
 
 
+def test_what_an_axis_says_of_its_encoder_holds_for_its_signals_in_counts(tmp_path):
+    bare = POSITION.replace(", counts_per_turn = 4096", "")
+    setpoint = 'setpoint_position = {column = "enc", unit = "counts", counts_per_turn = 8192}\n'
+    axis = imported(tmp_path, "counts_per_turn = 4096\n" + bare + setpoint + FORCE).axes["q"]
+    np.testing.assert_allclose(axis.position, 2.0 * np.pi * COUNTS / 4096.0)
+    np.testing.assert_allclose(axis.columns["setpoint_position"], 0.5 * axis.position)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("counts_per_metre = 2.0\n" + POSITION + FORCE, "none of the axis' signals is in counts"),
         ('position = {column = "enc", unit = "counts"}\n' + FORCE,
          "axes.q: position: unit 'counts' needs counts_per_turn or counts_per_metre"),
         ('position = {column = "enc", unit = "inc", scale = 1e-6}\n'

@@ -234,8 +234,13 @@ def lines_of(file: File, axis: Axis, answers: Answers) -> Iterator[str]:
     """The table of an axis, with what is asked for and what is not used."""
     yield ""
     yield f"[axes.{axis.name}]"
-    for entry in entries_of(file, axis):
-        yield entry.answered(answers).line(file.columns[entry.signal.column])
+    entries = [entry.answered(answers) for entry in entries_of(file, axis)]
+    for entry in entries:
+        yield entry.line(file.columns[entry.signal.column])
+    asked = {n.entry: n for e in entries for n in e.needs if n.entry in (TURN, METRE)}
+    for name, need in asked.items():
+        travels = f", or {METRE} where the axis travels" if METRE in need.what[len(name) :] else ""
+        yield f"# {name} = ? # NOT KNOWN, of the encoder{travels}"
     for field, what in axis.asked.items():
         yield f'# {field} = {{column = "?", unit = "?"}} # {what}'
     if (need := constant_of(axis)) is not None:
