@@ -45,8 +45,10 @@ def _compared_again(step: Step, found: Found) -> Found:
     fitted = (_in_its_place(t, own, without, found) for t in rivals.values())
     tied = [t for t in fitted if t is not None]
     # Another shape of a law was fitted beside what the search had then, and cannot lead; nor does
-    # what was found where its values cannot be its own and those of a rival can.
-    leading = [t for t in tied if isinstance(t.change, Added)]
+    # what was found where its values cannot be its own and those of a rival can, nor what was
+    # doubted: it would be doubted again, without an end.
+    added = (t for t in tied if isinstance(t.change, Added))
+    leading = [t for t in added if t.change.name not in found.barred]
     is_own = not doubt(without, final.fit, own.change.effect, parameters(own.change))
     leader = simplest([own, *leading] if is_own or not leading else leading)
     others = tuple(t for t in ((own, *tied) if is_own else tied) if t is not leader)
