@@ -1,0 +1,33 @@
+"""Fit, comparison, diagnosis and addition tell one error and one floor of one log and one model."""
+
+from __future__ import annotations
+
+import pytest
+from planted_logs import RATE, SLIDE, Ride, few, having, logged
+
+from identify import adding, workflow
+from twin.model.machine import MachineModel
+
+KNOWN = few("cogging", "spring", "quadratic_drag")
+HIDDEN = {
+    "nothing": SLIDE,
+    "cogging": having(SLIDE, "cogging", p=0.021, a1=0.05, b1=0.02),
+    "spring": having(SLIDE, "spring", k1=4.0),
+    "drag": having(SLIDE, "quadratic_drag", c=3.0),
+}
+
+
+@pytest.mark.parametrize("noise", [2e-3, 0.1])
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_every_command_tells_the_same_of_one_log(hidden: str, noise: float) -> None:
+    """Of white noise in the command, which every log shows."""
+    model, log = MachineModel("m", {"x": SLIDE}, RATE), logged(HIDDEN[hidden], Ride(3), noise=noise)
+    fitted = workflow.fit(model, {"a": log})
+    own = fitted.fits["x"]
+    compared = workflow.compare(fitted.model, {"a": log}).axes["x"]
+    base = workflow.diagnose(model, {"a": log}, catalogue=KNOWN).axes["x"].base
+    added = adding.add(KNOWN["spring"], model, {"a": log}, axis="x").step.fit_error_before
+    for error in (compared.total_error, base.error, added):
+        assert error == pytest.approx(own.error, rel=1e-3)
+    for ratio in (compared.ratio, base.ratio):
+        assert ratio == pytest.approx(own.ratio, rel=1e-2)
