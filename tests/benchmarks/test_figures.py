@@ -123,3 +123,9 @@ def test_a_revision_that_is_none_is_one_line() -> None:
 )
 def test_exists(module, function):
     assert callable(getattr(module, function))
+
+
+def test_lines_of_code_are_those_without_docstrings_blanks_and_comments():
+    text = '"""What\nit is."""\n\nx = (  # why\n    1,\n)\n# alone\n'
+    text += 'class A:\n    """A."""\n    y: int\n    """Of it."""\n'
+    assert Code({"twin/a.py": text}).code_lines == 5

@@ -238,8 +238,8 @@ def lines_of(file: File, axis: Axis, answers: Answers) -> Iterator[str]:
     for entry in entries:
         yield entry.line(file.columns[entry.signal.column])
     asked = {n.entry: n for e in entries for n in e.needs if n.entry in (TURN, METRE)}
-    for name, need in asked.items():
-        travels = f", or {METRE} where the axis travels" if METRE in need.what[len(name) :] else ""
+    for name, lacks in asked.items():
+        travels = f", or {METRE} where the axis travels" if METRE in lacks.what[len(name) :] else ""
         yield f"# {name} = ? # NOT KNOWN, of the encoder{travels}"
     for field, what in axis.asked.items():
         yield f'# {field} = {{column = "?", unit = "?"}} # {what}'
