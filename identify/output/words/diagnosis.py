@@ -254,6 +254,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
 
 # --- the answer -------------------------------------------------------------------------------
 
+WORTH = 0.01  # of the squared test error, below which a finding is told behind the others
 VERDICTS = {
     Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
     Verdict.WRONG_SHAPE: (
@@ -357,16 +358,28 @@ def headline_in_words(found: AxisDiagnosis) -> str:
 
 
 def named_in_words(found: AxisDiagnosis) -> str:
-    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is."""
-    alike = {f.effect for f in found.findings if f.kind is FindingKind.RESEMBLES}
+    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is.
+
+    What explains next to nothing beside the others is told as such.
+    """
+    large = [f for f in found.missing if f.explains >= WORTH] or found.missing
+    said = _each_in_words(found, large)
+    if small := [f for f in found.missing if f not in large]:
+        said += f", and for less than {percent(WORTH)} of the squared error "
+        said += _each_in_words(found, small)
+    return said
+
+
+def _each_in_words(found: AxisDiagnosis, some: Sequence[Finding]) -> str:
+    """Some of the missing effects, each with those that explain as much."""
     each = [
-        " or ".join(
-            (f"something like {name}" if name in alike else name, *tied_in_words(name, found))
-        )
-        for name in found.named
-    ]
-    ambiguous = any(tied for _, *tied in found.answers)
-    return ", and ".join(each) if ambiguous or not each else listed(each)
+        " or ".join((
+            f"something like {f.effect}" if f.kind is FindingKind.RESEMBLES else f.effect,
+            *tied_in_words(f.effect, found),
+        ))
+        for f in some
+    ]  # fmt: skip
+    return ", and ".join(each) if any(f.tied for f in some) or not each else listed(each)
 
 
 def all_found(found: AxisDiagnosis) -> str:

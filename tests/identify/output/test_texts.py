@@ -25,6 +25,7 @@ from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
+from identify.output.words.diagnosis import named_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement
@@ -224,3 +225,10 @@ def test_a_text_is_as_it_was_read(name: str) -> None:
 
 if __name__ == "__main__":
     FILE.write_text("".join(f"== {n}\n{text}\n\n" for n, text in texts().items()), encoding="utf-8")
+
+
+def test_what_explains_next_to_nothing_is_told_behind_the_others() -> None:
+    cogging, lugre = made.FOUND
+    found = made.diagnosis_of(findings=(cogging, replace(lugre, explains=0.002)))
+    assert named_in_words(found).endswith(", and for less than 1 % of the squared error lugre")
+    assert named_in_words(made.diagnosis_of(findings=(replace(lugre, explains=0.002),))) == "lugre"
