@@ -154,11 +154,24 @@ class Choice:
         return Moved(others[g], tied, found.values[self.regression.spans[g]], score)
 
     def _in_its_place(self, g: int, chosen: Chosen) -> list[int]:
-        """The groups that explain as much in the place of one, in the best set without it."""
-        other = self._needed(self._grown(frozenset({g})))
-        if self.criterion(other) > self.criterion(chosen) + RULE.least_bic:
-            return []
-        return sorted(other - chosen)
+        """The groups that explain as much in the place of one, in the best sets without it.
+
+        Without it and those found already, as each may hide another that does as well.
+        """
+        barred, found = frozenset({g}), list[int]()
+        while True:
+            other = self._needed(self._grown(barred))
+            new = sorted(other - chosen)
+            if not new or not self._level(other, chosen):
+                return found
+            barred, found = barred | {*new}, [*found, *new]
+
+    def _level(self, other: Chosen, chosen: Chosen) -> bool:
+        """Whether a set explains as much as a better one, or leaves no part more that matters."""
+        if self.criterion(other) <= self.criterion(chosen) + RULE.least_bic:
+            return True
+        more = self.regression.score(self.solution(other), self.solution(chosen), 1)
+        return max(more.training.part, more.other.part) < RULE.least_part
 
 
 def _shifted(rows: Rows, span: slice, rng: np.random.Generator) -> Rows:
