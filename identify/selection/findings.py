@@ -27,6 +27,7 @@ from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.search import Found, Step
 from identify.selection.trying import parameters
+from twin.curve import Coordinate
 from twin.model.machine import AxisModel
 from twin.threads import trim_memory
 
@@ -277,10 +278,23 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
         if finding.kind is FindingKind.MISSING and not bend.differs:
             return finding
         drawn = exponent_curve(without[name], final, dataset)
-        return replace(finding, kind=kind, bend=bend, shape=drawn)
+        tied = _alike_over(finding, drawn.over, found)
+        return replace(finding, kind=kind, bend=bend, shape=drawn, tied=tied)
     assert isinstance(change, Reshaped)
     before = less if name in less.axis.names else fit_axis(without, dataset.training)
-    return replace(finding, kind=kind, shape=found_shape(change.shape, before, dataset))
+    drawn = found_shape(change.shape, before, dataset)
+    tied = _alike_over(finding, change.shape.curve.over, found)
+    return replace(finding, kind=kind, shape=drawn, tied=tied)
+
+
+def _alike_over(finding: Finding, over: Coordinate, found: Found) -> tuple[str, ...]:
+    """What a law of another shape is told with: a curve over speed is no more the one than others.
+
+    Those that did nearly as well before it had that shape, and are drawn over the same coordinate.
+    """
+    kin = (t.change.effect for s in found.steps if s.change.name == finding.effect for t in s.kin)
+    names = (e.name for e in kin if any(c.over is over for c in e.curves))
+    return tuple(dict.fromkeys((*finding.tied, *names)))
 
 
 def _errors(before: Fit, after: Fit, dataset: Dataset) -> tuple[Errors, Errors]:

@@ -49,6 +49,8 @@ from twin.effects import Catalogue
 from twin.parallel import Progress, silent, within
 from twin.threads import trim_memory
 
+NEARLY = 0.66  # of the part that the best takes, from which another law does nearly as well
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -56,7 +58,8 @@ class Step:
 
     with_others: whether it is accepted only together with another step. held: whether a later free
     curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
-    that were not needed any more beside it.
+    that were not needed any more beside it. kin: the others that do nearly as well; a law that ends
+    in another shape resembles any of them.
     """
 
     tried: Tried
@@ -64,6 +67,7 @@ class Step:
     with_others: bool = False
     held: bool = False
     dropped: tuple[str, ...] = ()
+    kin: tuple[Tried, ...] = ()
 
     @property
     def change(self) -> Change:
@@ -294,7 +298,9 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         best = _best_of(lowering)
     tied = [best, *(t for t in lowering if t is not best and is_tied(t, best))]
     first = simplest(tied)
-    return [Step(first, tuple(t for t in tied if t is not first))]
+    kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
+    others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
+    return [Step(first, others, kin=alike)]
 
 
 def simplest(tied: Sequence[Tried]) -> Tried:
@@ -323,8 +329,8 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
 
     It has shown that something is missing, so none of them has to be the best of many by itself.
     """
-    # A curve of ten numbers can imitate any law: one that reaches two thirds of it is preferred.
-    least = 0.66 * curve.candidate.part
+    # A curve of ten numbers can imitate any law.
+    least = NEARLY * curve.candidate.part
     laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
     alone = (
         t if t.candidate.supported else judged_change(judged, t.screening, t.judged.fit)
