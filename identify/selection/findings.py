@@ -26,6 +26,7 @@ from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.search import Found, Step
+from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
 from twin.curve import Coordinate
 from twin.model.machine import AxisModel
@@ -291,8 +292,10 @@ def _alike_over(finding: Finding, over: Coordinate, found: Found) -> tuple[str, 
     """What a law of another shape is told with: a curve over speed is no more the one than others.
 
     Those that did nearly as well before it had that shape, and are drawn over the same coordinate.
+    Frictions were compared as they are in the end (``ties``).
     """
-    kin = (t.change.effect for s in found.steps if s.change.name == finding.effect for t in s.kin)
+    steps = (s for s in found.steps if s.change.name == finding.effect)
+    kin = (t.change.effect for s in steps if s.change.effect.kind not in ALIKE for t in s.kin)
     names = (e.name for e in kin if any(c.over is over for c in e.curves))
     return tuple(dict.fromkeys((*finding.tied, *names)))
 
