@@ -101,7 +101,9 @@ def differing(effect: Effect, length: float, force: float) -> list[str]:
     back = in_units(there.axis[effect.name], 1.0 / length, 1.0 / force)
     for p in effect.parameters:
         one, other = here.axis[effect.name].values[p.name], back.values[p.name]
-        if abs(one - other) > SAME * max(abs(one), abs(other)):
+        # Of a ratio that is nothing, such as of a payload that is not there, rounding decides.
+        nothing = 1e-5 if p.unit == "1" else 0.0
+        if abs(one - other) > SAME * max(abs(one), abs(other), nothing):
             out.append(f"{p.name} {one:g}, {other:g} {p.unit}")
     return out
 
