@@ -137,7 +137,7 @@ def diagnose_axis(
         return at_another_length(ended, lengths, catalogue, progress)
 
     ended, odd = without_odd_log(base, dataset, conclude)
-    found, findings = ended.found, _by_worth(ended.findings)
+    found, findings = ended.found, ended.findings
     final = found.final
     # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
@@ -156,11 +156,6 @@ def diagnose_axis(
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
         by_roles=role_dependent(found, findings),
     )
-
-
-def _by_worth(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """What explains most of the test error first; the search asks for what takes most of a rest."""
-    return tuple(sorted(findings, key=lambda f: -f.explains))
 
 
 def _verdict(findings: tuple[Finding, ...], quiet: bool) -> Verdict:

@@ -112,7 +112,7 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     assert (done.returncode, told["named"]) == (0, True)
     assert [line[:2] for line in said if line[1] == "."] == ["1.", "2.", "3.", "4.", "5."]
     hidden = told["hidden"]
-    assert told["addition"]["effect"] == hidden
+    assert told["diagnosis"]["missing"] == [hidden]
     assert f"names {hidden} on x" in done.stderr
     logs = {p.name: read_log(p) for p in sorted((tmp_path / "new").glob("*.mcap"))}
     assert [log.metadata["experiment"] for log in logs.values()] == [*("tracking", "moves") * 2]
@@ -127,7 +127,7 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     page = (tmp_path / told["report"]).read_text(encoding="utf-8")
     assert page.count("<section") > 3
     typed = re.sub("<.*?>", "", page[page.index("<code>") : page.index("</code>")])
-    assert typed.startswith(f"twin add {hidden} m.toml new/machine_1.mcap new/machine_2.mcap ")
+    assert typed.startswith("twin diagnose m.toml new/machine_1.mcap new/machine_2.mcap ")
     opened = re.search(r'"against": *"(\w+)"', page)
     assert opened
     assert (opened[1] == "time") is (hidden == "periodic_disturbance")
