@@ -6,7 +6,8 @@ of force ripple in linear permanent magnet motors", Proc. American Control Confe
 """
 
 from twin.effect import Effect, Kind, U, X
-from twin.law_parts import TRACK, along_track, cosine_terms
+from twin.knee import Imitated
+from twin.law_parts import TRACK, along_track, cosine_terms, turns_with_direction
 
 
 def law(p, s, io):
@@ -20,6 +21,8 @@ EFFECT = Effect(
     source="Rohrig, Jochheim 2001, thrust constant by position",
     parameters=(*TRACK, *cosine_terms(0.5)),
     law=law,
+    # At a place that is passed one way the motor's force is nearly one, and any force does as well.
+    knees=(turns_with_direction(Imitated.OF_POSITION),),
     fingerprint="residual varies along the track in proportion to the motor force there",
     excited_by="strong accelerations both ways at many places",
 )

@@ -74,7 +74,8 @@ CASES: dict[str, dict[str, list[tuple[float, Imitated | None]]]] = {
     "leuven": {"sigma0": REACH},
     "lugre": {"sigma0": REACH},
     "modified_leuven": {"sigma0": REACH},
-    "position_dependent_friction": {},  # by how the axis moved alone, below
+    "position_dependent_force_constant": {},  # by how the axis moved alone, below
+    "position_dependent_friction": {},
     "periodic_disturbance": {
         "f": [(0.1, Imitated.DRIFT), (7.0, None), (3e3, Imitated.NOTHING)]
     },
@@ -124,8 +125,11 @@ def test_a_law_whose_knee_the_motion_does_not_pass_is_another(name):
                 assert (found.size < found.edge) or (found.size > found.edge)
 
 
-@pytest.mark.parametrize("name", ["position_dependent_friction", "friction_ripple"])
-def test_what_varies_along_the_track_is_no_friction_where_the_axis_moves_one_way(name):
+@pytest.mark.parametrize(
+    "name",
+    ["position_dependent_friction", "friction_ripple", "position_dependent_force_constant"],
+)
+def test_what_varies_along_the_track_is_a_force_of_position_where_the_axis_moves_one_way(name):
     effect = CATALOGUE[name]
     for share, imitated in [(0.0, Imitated.OF_POSITION), (0.2, Imitated.OF_POSITION), (1.0, None)]:
         found = effect.imitation(values_of(effect), replace(SEEN, both_ways=share))
