@@ -276,6 +276,7 @@ def test_a_video_without_what_draws_is_one_line(folder, monkeypatch) -> None:
     assert not (folder / "v.mp4").exists()
 
 
+@pytest.mark.slow
 def test_a_video_has_pictures_that_differ(folder) -> None:
     command = ("view", "l.mcap", "proton_xy", "--video", "v.mp4", "--speed", 30)
     done = process(*command, folder=folder)

@@ -108,6 +108,7 @@ def test_nothing_is_missing(step: float) -> None:
     assert values["sigma2"] == pytest.approx(VISCOUS, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_cogging_is_named_and_nothing_beside_it() -> None:
     answer = found(1e-6, HEIGHT)
     assert answer.named == ("cogging",)
