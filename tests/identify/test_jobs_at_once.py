@@ -18,7 +18,7 @@ from twin.telling import heard, tell
 MODEL = MachineModel("slide", {"x": SLIDE}, RATE)
 TRUE = having(SLIDE, "cogging", p=0.021, a1=0.9, b1=0.5)
 KNOWN = few("cogging", "spring", "quadratic_drag")
-LOGS = {name: logged(TRUE, Ride(seed)) for seed, name in enumerate("abc", start=1)}
+LOGS = {name: logged(TRUE, Ride(seed, 3.0)) for seed, name in enumerate("abc", start=1)}
 
 
 def diagnosed(copy: str) -> tuple[dict, list[str]]:

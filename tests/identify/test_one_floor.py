@@ -17,11 +17,14 @@ HIDDEN = {
 }
 
 
-@pytest.mark.parametrize("noise", [2e-3, 0.1])
+@pytest.mark.parametrize("noise", [2e-3, pytest.param(0.1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_every_command_tells_the_same_of_one_log(hidden: str, noise: float) -> None:
     """Of white noise in the command, which every log shows."""
-    model, log = MachineModel("m", {"x": SLIDE}, RATE), logged(HIDDEN[hidden], Ride(3), noise=noise)
+    model, log = (
+        MachineModel("m", {"x": SLIDE}, RATE),
+        logged(HIDDEN[hidden], Ride(3, 3.0), noise=noise),
+    )
     fitted = workflow.fit(model, {"a": log})
     own = fitted.fits["x"]
     compared = workflow.compare(fitted.model, {"a": log}).axes["x"]
