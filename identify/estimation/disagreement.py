@@ -31,7 +31,8 @@ from twin.signals import Array, rate
 OUT = 2.5  # times the error of any other log, where they have been, from which one stands out
 FEW = 2.0  # times as much asked of three logs, as of two others nobody knows how alike they are
 PEAK = 3.0  # times the largest error of any other moment, from which one stands out
-ALONE = 1.5  # times the error of any other log, that one parameter of its own takes away
+CLEAR = 10.0  # times its scatter between the others, from which a parameter has another value
+CHANGED = 0.2  # of its value; a law of a slightly wrong shape moves it by less from log to log
 MOMENT = 0.1  # of a log; what lasts longer is no moment
 
 
@@ -144,32 +145,67 @@ def _against(
     if (moment := _moment(own, left, theirs, more)) is not None:
         return moment
     near, name = _near(own, others), own.log.motion.name
-    own_value, seen = _otherwise(own, left, axis, where), rms(left)
-    seen = min(seen, rms(left[near])) if near.any() else 0.0
-    if own_value is not None and seen > more * ALONE * most:
-        return Disagreement(name, rms(left), most, None, own_value)
+    best = _best(own, left)
+    own_value = None if best is None else _otherwise(best, own, left, axis, where)
+    if own_value is not None and near.any():
+        change = abs(_gains(own, left, near)[0][best])
+        far = change > more * CLEAR * _scatter(best, others, theirs)
+        if far and change > CHANGED * _usual(best, own, own_value[2], where):
+            return Disagreement(name, rms(left), most, None, own_value)
+    seen = min(rms(left), rms(left[near])) if near.any() else 0.0
     if seen > more * OUT * most:
         return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
     return None
 
 
-def _otherwise(
-    own: _Rows, left: Array, axis: AxisModel, where: Sequence[ParameterReference]
-) -> tuple[str, float, float] | None:
-    """The parameter that by another value explains what is left (n,) N; None where none does."""
-    most = 0.6  # of the squared error, that it takes by itself
-    command = own.log.command[own.kept]
-    columns = np.column_stack([own.columns, command])
+def _gains(
+    own: _Rows, left: Array, among: slice | NDArray[np.bool_] = slice(None)
+) -> tuple[Array, Array]:
+    """How much of each column (k,), and of the command, alone takes most of what is left (n,) N.
+
+    And the sum of squares of each. among: which rows are asked.
+    """
+    columns = np.column_stack([own.columns, own.log.command[own.kept]])[among]
     size = np.sum(columns**2, axis=0)
-    gains = columns.T @ left / np.where(size > 0.0, size, np.inf)
+    return columns.T @ left[among] / np.where(size > 0.0, size, np.inf), size
+
+
+def _usual(at: int, own: _Rows, value: float, where: Sequence[ParameterReference]) -> float:
+    """The gain of a column that its value is, or the command, where it may have either sign."""
+    if at < len(where) and where[at].parameter.lower < 0.0:
+        size = np.linalg.norm(own.columns[:, at]) or np.inf
+        return float(np.linalg.norm(own.log.command[own.kept]) / size)
+    return abs(value) * float(np.append(own.size, 1.0)[at])
+
+
+def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float:
+    """The scatter of the gain of one column between logs, that which tell it most first."""
+    gains, sizes = zip(
+        *(_gains(r, left) for r, left in zip(others, theirs, strict=True)), strict=True
+    )
+    gain, size = np.stack(gains)[:, at], np.stack(sizes)[:, at]
+    freedom = (len(others) - 1) / len(others)
+    return float(np.sqrt(np.sum(size * gain**2) / max(size.sum(), 1e-300) / freedom))
+
+
+def _best(own: _Rows, left: Array) -> int | None:
+    """The column that alone explains what is left (n,) N, the last that of the command."""
+    most = 0.5  # of the squared error, that it takes by itself
+    gains, size = _gains(own, left)
     taken = gains**2 * size / np.sum(left**2)
     best = int(np.argmax(taken))
-    if taken[best] < most:
-        return None
+    return best if taken[best] > most else None
+
+
+def _otherwise(
+    best: int, own: _Rows, left: Array, axis: AxisModel, where: Sequence[ParameterReference]
+) -> tuple[str, float, float] | None:
+    """The parameter of a column, its value in a log and in others; None where it can have none."""
+    gain = float(_gains(own, left)[0][best])
     if best == len(where):
-        return "force", 1.0 - float(gains[best]), 1.0
+        return "force", 1.0 - gain, 1.0
     value = float(read(axis, where[best : best + 1])[0])
-    other, least = value - float(gains[best] / own.size[best]), where[best].parameter.lower
+    other, least = value - gain / float(own.size[best]), where[best].parameter.lower
     return (where[best].label, other, value) if other >= least else None
 
 

@@ -39,7 +39,9 @@ def with_odd(
 def _disagrees(odd: Disagreement, units: AxisUnits) -> str:
     """By how much a log disagrees with the others, when, and as if what were otherwise in it."""
     error, others = (quantity(size, units.force) for size in (odd.error, odd.others))
-    said = f"disagrees with the other logs: {odd.times:.1f} times their error, {error} of {others}"
+    said = "disagrees with the other logs"
+    if odd.times > 1.0:
+        said += f": {odd.times:.1f} times their error, {error} of {others}"
     if odd.span:
         said += ", above all from " + " to ".join(quantity(instant, "s") for instant in odd.span)
     if odd.otherwise:

@@ -85,3 +85,16 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert told.dataset.odd.log == "run1"
     assert "run1 disagrees with the other logs" in str(found)
     assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
+
+
+def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
+    machine = having(SLIDE, "cogging", p=0.02, a1=0.3)
+    warm = having(machine, "coulomb_viscous", Fc=0.6 * SLIDE["coulomb_viscous"].values["Fc"])
+    logs = runs(machine, run1=warm)
+    training = {name: logs[name] for name in ("run0", "run1", "run2")}
+    found = identify.diagnose(MODEL, training, {"run3": logs["run3"]}, catalogue=few("spring"))
+    odd = found.axes["x"].dataset.odd
+    assert odd is not None
+    assert odd.log == "run1"
+    assert odd.otherwise is not None
+    assert odd.otherwise[0] == "coulomb_viscous.Fc"
