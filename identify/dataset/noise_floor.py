@@ -29,8 +29,10 @@ from identify.dataset.prepared_log import (
     PreparedLog,
     motor_gain,
     moving,
+    on_blocks,
     split_by_log,
     sticks,
+    total_force,
 )
 from identify.dataset.readings import rate_gain, white_rounding
 from identify.dataset.spectrum import median_spectrum
@@ -49,7 +51,8 @@ class NoiseFloor:
 
     low, high: between which it is, with a probability of 95 %. parts: N RMS of each, whose squares
     make up that of value: "sensors", white; "rounding" of the readings, where the axis has an
-    encoder with steps; "aliasing" of the command by a thinned log; "force", that no sensor makes.
+    encoder with steps; "aliasing" of the command by a thinned log; "path", what laws with memory
+    make of what the readings do not tell of it; "force", that no sensor makes.
     """
 
     value: float
@@ -70,7 +73,7 @@ class NoiseFloor:
     @property
     def follows_motion(self) -> bool:
         """Whether most of its square is rounding and its aliases, whose size the motion sets."""
-        moved = sum(self.parts[name] ** 2 for name in ("rounding", "aliasing"))
+        moved = sum(self.parts[name] ** 2 for name in ("rounding", "aliasing", "path"))
         return moved > 0.5 * self.value**2
 
     def at_most(self, error: float) -> NoiseFloor:
@@ -155,11 +158,12 @@ def _of_parts(
         "sensors": size([replace(n, folded=0.0) for n in sensors]),
         "rounding": rounds if told else 0.0,
         "aliasing": size([replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]),
+        "path": _together([_of_path(axis, log) for log in logs], motions) / gain,
         "force": float(np.sqrt(np.mean([log.force_noise**2 for log in logs]))),
     }
     # of a part's RMS, by which its estimate misses it, see tests of the noise floor; the slow steps
     # of rounding depend on where the axis turns
-    errors = dict.fromkeys(parts, 0.1) | {"rounding": 0.3}
+    errors = dict.fromkeys(parts, 0.1) | {"rounding": 0.3, "path": 0.5}
     errors["aliasing"] += 0.5 * max(n.scatter for n in noises)
     power = sum(size**2 for size in parts.values())
     sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)
@@ -167,6 +171,24 @@ def _of_parts(
     low = np.sqrt(max(power - scatter, 0.0))
     high = np.sqrt(power + scatter + (0.0 if told else rounds**2))
     return NoiseFloor(float(np.sqrt(power)), float(low), float(high), parts)
+
+
+def _of_path(axis: AxisModel, log: PreparedLog) -> float:
+    """Mean square, N^2, of what laws with memory make of what the readings tell of their path.
+
+    As they differ along the path that every second reading tells: of noise that is its error, of
+    what lies between the samples more than it. Not where what they hold balances the force.
+    """
+    motion, told = log.motion, log.told > 0.5
+    if motion.path is None or not told.any():
+        return 0.0
+    own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
+    if not own.effects:
+        return 0.0
+    table = on_blocks(own)
+    coarse = replace(motion, path=motion.path.of_every_second())
+    apart = log.test_function.mean(total_force(table, motion) - total_force(table, coarse))
+    return float(np.mean(apart[told & moving([log], sticks(axis))] ** 2))
 
 
 def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:
