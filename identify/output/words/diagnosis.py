@@ -24,9 +24,9 @@ from identify.output.numbers import (
 )
 from identify.output.words.fit import (
     OUTCOMES,
-    aliasing_in_words,
     dependence_in_words,
     moved_in_words,
+    noise_in_words,
     prepared_in_words,
     refit_in_words,
     repeat_in_words,
@@ -489,7 +489,7 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
         *_about_the_fits(found, summary),
         found.repeat and repeat_in_words(found.repeat),
         None if found.dataset.selection else NO_SELECTION_LOG,
-        summary.noise and aliasing_in_words(summary.noise, units),
+        summary.noise and noise_in_words(summary.noise, units),
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]
     if why := result.not_planned.get(axis):

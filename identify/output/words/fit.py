@@ -233,16 +233,26 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
     )
 
 
-def aliasing_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
-    """That thinning the log made most of its noise, and what to log; None where it did not."""
-    folded = noise.parts.get("aliasing", 0.0)
-    if folded**2 < 0.5 * noise.value**2 or folded == 0.0:
+MOSTLY = {
+    "aliasing": (
+        "the command's fast part, of which the log keeps single samples: log at the control rate, "
+        "or the drive's averaged current"
+    ),
+    "path": (
+        "what its friction makes of the path that the readings do not tell: log at a higher rate, "
+        "or with a finer encoder"
+    ),
+}
+
+
+def noise_in_words(noise: NoiseFloor, units: AxisUnits) -> str | None:
+    """What made most of its noise, and what to log; None where that is no matter of logging."""
+    most = max(MOSTLY, key=lambda part: noise.parts.get(part, 0.0))
+    size = noise.parts.get(most, 0.0)
+    if size**2 < 0.5 * noise.value**2 or size == 0.0:
         return None
-    return (
-        f"{quantity(folded, units.force)} of the noise floor of "
-        f"{quantity(noise.value, units.force)} is the command's fast part, of which the log keeps "
-        "single samples: log at the control rate, or the drive's averaged current"
-    )
+    floor = quantity(noise.value, units.force)
+    return f"{quantity(size, units.force)} of the noise floor of {floor} is {MOSTLY[most]}"
 
 
 # --- what a fit changed -----------------------------------------------------------------------

@@ -6,6 +6,8 @@ from machines import CATALOGUE
 
 from benchmarks.second_simulator.contacts import DAHL, Contact, log_of
 from identify.dataset.path import Path
+from identify.dataset.preparation import datasets
+from identify.estimation.fit import Outcome, finished
 from identify.workflow import compare, fit
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
@@ -31,6 +33,17 @@ def test_the_true_values_leave_little_whatever_the_noise_of_the_readings(noise, 
     axis = compare(dahl(STIFFNESS), logged(noise), test_function=0.05).axes["q"]
     assert axis.total_error < most
     assert axis.position_error["run"] < 3e-5
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-8, 5e-7])
+def test_what_the_true_values_leave_is_their_noise_floor_and_what_others_leave_is_not(noise):
+    def ratio(stiffness):
+        model = dahl(stiffness)
+        (axis,), (dataset,) = model.axes.values(), datasets(model, logged(noise), {}, 0.05).values()
+        return finished(axis, axis, dataset.training, Outcome.CONVERGED).ratio
+
+    assert ratio(STIFFNESS) < 1.1
+    assert ratio(0.01 * STIFFNESS) > 100.0
 
 
 def test_noise_does_not_soften_a_contact():

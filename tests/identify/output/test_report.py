@@ -26,7 +26,7 @@ from identify.output.numbers import DisplayUnit, capitalised, quantity, span, ty
 from identify.output.report.explorer import coordinate_of_answer, explored, shown_of
 from identify.output.report.page import Chart
 from identify.output.report.residual import regions
-from identify.output.words.fit import aliasing_in_words, moved_in_words, place_in_words
+from identify.output.words.fit import moved_in_words, noise_in_words, place_in_words
 from identify.output.words.next_step import (
     Source,
     axis_in_words,
@@ -419,13 +419,22 @@ def test_a_gap_is_missing_where_few_of_the_data_are(share, said) -> None:
     assert gap_in_words(Gap("speed", "m/s", 0.01, 0.05, share)).startswith(said)
 
 
-@pytest.mark.parametrize(("folded", "told"), [(0.038, True), (0.02, False), (0.0, False)])
-def test_a_thinned_log_is_told_with_what_to_log_instead(folded: float, told: bool) -> None:
-    noise = NoiseFloor(0.04, 0.03, 0.05, {"sensors": 0.01, "aliasing": folded})
-    said = aliasing_in_words(noise, LINEAR) or ""
+@pytest.mark.parametrize(
+    ("part", "advice"),
+    [
+        ("aliasing", "log at the control rate, or the drive's averaged current"),
+        ("path", "log at a higher rate, or with a finer encoder"),
+    ],
+)
+@pytest.mark.parametrize(("size", "told"), [(0.038, True), (0.02, False), (0.0, False)])
+def test_noise_that_logging_makes_is_told_with_what_to_log_instead(
+    part: str, advice: str, size: float, told: bool
+) -> None:
+    noise = NoiseFloor(0.04, 0.03, 0.05, {"sensors": 0.01, part: size})
+    said = noise_in_words(noise, LINEAR) or ""
     assert bool(said) is told
     assert ("38.0 mN of the noise floor of 40.0 mN" in said) is told
-    assert ("log at the control rate, or the drive's averaged current" in said) is told
+    assert (advice in said) is told
 
 
 def test_an_experiment_in_short_has_the_units_of_its_parameters() -> None:
