@@ -147,7 +147,7 @@ def _against(
     near, name = _near(own, others), own.log.motion.name
     best = _best(own, left)
     own_value = None if best is None else _otherwise(best, own, left, axis, where)
-    if own_value is not None and near.any():
+    if best is not None and own_value is not None and near.any():
         change = abs(_gains(own, left, near)[0][best])
         far = change > more * CLEAR * _scatter(best, others, theirs)
         if far and change > CHANGED * _usual(best, own, own_value[2], where):
