@@ -11,6 +11,7 @@ from identify.estimation.offered import require_shown
 from identify.mechanism.bodies import corrected
 from identify.mechanism.departures import departures_of
 from identify.output.words.next_step import axis_in_words, notes_in_words
+from identify.output.words.recording import read_otherwise_in_words
 from identify.results.results import (
     Addition,
     AllAdded,
@@ -21,7 +22,7 @@ from identify.results.results import (
 from identify.selection.acceptance import Judged, score
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import reshape, try_effect
-from identify.workflow import Model, as_given, fit, fit_as_given
+from identify.workflow import Model, as_given, fit, fit_as_given, read_as, recording_of
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
@@ -52,8 +53,12 @@ def add(
     effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
-    parts = as_given(model, logs, holdout, test)
-    before = fit_as_given(*parts, Catalogue([]), test_function, progress, [effect])
+    model, *parts = as_given(model, logs, holdout, test)
+    recording = recording_of(model, parts[0])
+    training, selection, tests = (read_as(recording, part) for part in parts)
+    before = fit_as_given(
+        model, training, selection, tests, Catalogue([]), test_function, progress, [effect]
+    )
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
@@ -71,7 +76,8 @@ def add(
     best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
     having = [n for n in names if n not in open_axes]
     made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
-    return _with_notes(made, axis_in_words(effect.name, best.axis, names, having))
+    why = axis_in_words(effect.name, best.axis, names, having)
+    return _with_notes(made, *read_otherwise_in_words(recording), why)
 
 
 @parallel()
@@ -160,10 +166,10 @@ def correct_body(
     return CorrectedBody(made, before.model, found.bodies)
 
 
-def _with_notes(made: Addition, why_axis: str | None = None) -> Addition:
-    """An addition with what a reader should know; why_axis: why it went to its axis."""
+def _with_notes(made: Addition, *first: str | None) -> Addition:
+    """An addition with what a reader should know; first: what is to be said before."""
     kept, notes = notes_in_words(made)
-    return made.with_notes(kept, notes if why_axis is None else (why_axis, *notes))
+    return made.with_notes(kept, (*(note for note in first if note), *notes))
 
 
 @parallel()

@@ -112,13 +112,17 @@ def fit(
 
     logs, holdout, test: training, selection and test logs by name. catalogue: with it the result
     says which absent effects give the same force as a parameter that changed. test_function: length
-    in s; chosen from the noise where None. Raises InputError for logs that do not fit the model,
-    and where nothing can be fitted: an axis that comes to rest within every test function, a force
-    that is not a number.
+    in s; chosen from the noise where None. Logs of a mechanism are read as its file needs them,
+    which the result tells. Raises InputError for logs that do not fit the model, and where nothing
+    can be fitted: an axis that comes to rest within every test function, a force that is not a
+    number.
     """
-    parts = as_given(model, logs, holdout, test, catalogue)
-    known = Catalogue([]) if catalogue is None else usable(catalogue, parts[0])
-    return fit_as_given(*parts, known, test_function, progress)
+    model, *given = as_given(model, logs, holdout, test, catalogue)
+    recording = recording_of(model, given[0])
+    training, selection, tests = (read_as(recording, part) for part in given)
+    known = Catalogue([]) if catalogue is None else usable(catalogue, model)
+    found = fit_as_given(model, training, selection, tests, known, test_function, progress)
+    return replace(found, recording=recording)
 
 
 def fit_as_given(
@@ -187,6 +191,8 @@ def compare(
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     progress(READING, 0, 1)
     model, logs, *_ = as_given(model, logs)
+    recording = recording_of(model, logs)
+    logs = read_as(recording, logs)
     found = {
         axis: telling(dataset, sticks(model.axes[axis]))
         for axis, dataset in datasets(model, logs, {}, test_function).items()
@@ -195,7 +201,7 @@ def compare(
         require_residual(model.axes[axis], dataset)
     given = model.axes
     found = {axis: noise_known(given[axis], aligned(given[axis], d)) for axis, d in found.items()}
-    return _compared(model, found, {}, progress)
+    return replace(_compared(model, found, {}, progress), recording=recording)
 
 
 def as_given(
@@ -256,8 +262,8 @@ def diagnose(
     model = as_model(model, catalogue)
     known = usable(catalogue, model)
     model, *given = as_given(physics_alone(model), logs, holdout, test)
-    recording = misassigned(model, next(iter(given[0].values()))) if model.joints else None
-    training, selection, tests = (_read(part, recording) for part in given)
+    recording = recording_of(model, given[0])
+    training, selection, tests = (read_as(recording, part) for part in given)
     result = fit_as_given(
         model, training, selection, tests, Catalogue([]), test_function, progress, [*known.values()]
     )
@@ -295,11 +301,14 @@ def diagnose(
     return found
 
 
-def _read(logs: Mapping[str, Log], recording: Recording | None) -> Mapping[str, Log]:
+def recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:
+    """How the logs of a mechanism are another than its file needs, by the first of them."""
+    return misassigned(model, next(iter(logs.values()))) if model.joints else None
+
+
+def read_as(recording: Recording | None, logs: Mapping[str, Log]) -> Mapping[str, Log]:
     """Logs as they are read right."""
-    if recording is None:
-        return logs
-    return {name: recording.read(log) for name, log in logs.items()}
+    return {n: recording.read(log) for n, log in logs.items()} if recording else logs
 
 
 def _begun(

@@ -85,7 +85,7 @@ SHOWN = 4  # candidates of a diagnosis, and experiments of a plan, that are prin
 @text_of.register
 def fit_text(result: FitResult) -> str:
     """The fit of each axis, one parameter a line."""
-    lines: list[str] = []
+    lines = read_otherwise_in_words(result.recording)
     for axis in result.fits:
         first, *others = fit_in_words(result, axis)
         lines += [first, *(f"  {line}" for line in others), *_estimates(result, axis)]
@@ -125,7 +125,7 @@ def simulation_fit_text(result: SimulationFit) -> str:
 @text_of.register
 def compare_text(result: Comparison) -> str:
     """Errors by log, and the three worst regions of each axis."""
-    lines = []
+    lines = read_otherwise_in_words(result.recording)
     for axis, c in result.axes.items():
         words = c.units.words
         for name, error in c.force_error.items():
@@ -159,8 +159,7 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     """
     lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
-    if result.recording:
-        lines = [*read_otherwise_in_words(result.recording), *lines]
+    lines = [*read_otherwise_in_words(result.recording), *lines]
     for axis, d in result.axes.items():
         said, units, tested = said_of(result, axis), d.base.axis.units, d.tested
         named = f" Missing: {named_in_words(d)}." if d.named else ""

@@ -43,7 +43,8 @@ class FitResult(Printed):
     """A fitted machine: by axis the fit, the estimates, and the RMS force errors on other logs.
 
     holdout_error, test_error: on the selection and on the test logs; None where there are none.
-    given: the model before the fit. refits: what the fit changed of it, by axis.
+    given: the model before the fit. refits: what the fit changed of it, by axis. recording: how the
+    logs of a mechanism are another than its file needs; all is of them so read.
     """
 
     model: MachineModel
@@ -54,6 +55,7 @@ class FitResult(Printed):
     test_error: Mapping[str, float | None]
     given: MachineModel
     refits: Mapping[str, Refit]
+    recording: Recording | None = None
 
     @property
     def left_out(self) -> Mapping[str, Mapping[str, str]]:
@@ -104,10 +106,14 @@ class SimulationFit(Printed):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Pictured):
-    """The errors of a model on logs, by axis."""
+    """The errors of a model on logs, by axis.
+
+    recording: how the logs of a mechanism are another than its file needs; all is of them so read.
+    """
 
     model: MachineModel
     axes: Mapping[str, AxisComparison]
+    recording: Recording | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

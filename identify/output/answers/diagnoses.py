@@ -14,6 +14,7 @@ from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, an
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
+    RecordingEntry,
     RefitEntry,
     estimate_entries,
 )
@@ -442,18 +443,6 @@ class BodyAnswer(Answer, BodyEntry):
 def _(result: CorrectedBody, **more: Any) -> BodyAnswer:
     own, file = _of_body(result.body, result.given), result.model.mjcf_name
     return BodyAnswer.of(result.body, element=result.element, mujoco=file, **own, **more)
-
-
-class RecordingEntry(Entry):
-    """How a recording is another than a mechanism's file needs; all else is of it as read so."""
-
-    said: str
-    axis: str
-    """Of which it makes most."""
-    before: Number
-    """Part of its torque that bodies and friction leave as it is recorded."""
-    after: Number
-    """The same as it is read."""
 
 
 class DiagnosisAnswer(Answer, DiagnosisEntry):

@@ -78,6 +78,18 @@ class FitEntry(Entry):
     refit: RefitEntry | None
 
 
+class RecordingEntry(Entry):
+    """How a recording is another than a mechanism's file needs; all else is of it as read so."""
+
+    said: str
+    axis: str
+    """Of which it makes most."""
+    before: Number
+    """Part of its torque that bodies and friction leave as it is recorded."""
+    after: Number
+    """The same as it is read."""
+
+
 class FitAnswer(Answer):
     """What `twin fit` prints."""
 
@@ -87,6 +99,8 @@ class FitAnswer(Answer):
     """Axes of which no training log says anything."""
     left_out: list[str] = Field([])
     """Logs that say nothing of an axis, and why."""
+    recording: RecordingEntry | None
+    """Of a mechanism, in what its recording is another than its file needs."""
 
 
 @answer_of.register
@@ -106,7 +120,9 @@ def _(result: FitResult, **more: Any) -> FitAnswer:
         )
         for axis, fit in result.fits.items()
     }
-    return FitAnswer(axes=axes, not_fitted=list(result.not_fitted), **more)
+    recording = RecordingEntry.of(result.recording) if result.recording else None
+    rest = list(result.not_fitted)
+    return FitAnswer(axes=axes, not_fitted=rest, recording=recording, **more)
 
 
 def estimate_entries(estimates: tuple[Estimate, ...]) -> dict[str, EstimateEntry]:
@@ -382,11 +398,15 @@ class ComparisonAnswer(Answer):
 
     axes: dict[str, ComparisonEntry]
     left_out: list[str] = Field([])
+    recording: RecordingEntry | None
+    """Of a mechanism, in what its recording is another than its file needs."""
 
 
 @answer_of.register
 def _(result: Comparison, **more: Any) -> ComparisonAnswer:
-    return ComparisonAnswer.of(axes={a: _comparison(c) for a, c in result.axes.items()}, **more)
+    recording = RecordingEntry.of(result.recording) if result.recording else None
+    axes = {a: _comparison(c) for a, c in result.axes.items()}
+    return ComparisonAnswer.of(axes=axes, recording=recording, **more)
 
 
 def _comparison(c: AxisComparison) -> ComparisonEntry:

@@ -20,8 +20,10 @@ def recording_in_words(found: Recording) -> str:
     )
 
 
-def read_otherwise_in_words(found: Recording) -> list[str]:
-    """The same, and that the answers are about logs that are read so."""
+def read_otherwise_in_words(found: Recording | None) -> list[str]:
+    """The same, and that the answers are about logs read so; nothing where they are right."""
+    if found is None:
+        return []
     said = recording_in_words(found)
     return [
         f"The recording is not what the model needs: {said}.",

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.second_simulator.arms import Changed, drawn, log_of
 from identify.analysis.first_model import first_model
 from identify.analysis.recording import SIGNALS, TORQUES, Exchanged, Scaled, misassigned
-from identify.workflow import diagnose
+from identify.workflow import compare, diagnose, fit
 from twin.effects import Catalogue, load_catalogue
 
 CATALOGUE = load_catalogue()
@@ -60,6 +60,16 @@ def test_a_weight_that_is_taken_out_is_told_and_the_rest_is_of_the_whole_torque(
     assert str(found).startswith("The recording is not what the model needs: the recorded torques")
     assert not any(d.findings for d in found.axes.values())
     assert not found.bodies
+
+
+@pytest.mark.parametrize("ask", [fit, compare])
+def test_every_command_reads_it_right_and_says_so(ask):
+    model, log = recorded()
+    told = ask(model, {"a": Scaled(("joint2",), -1.0, TORQUES)(log)})
+    assert told.recording is not None
+    assert str(told).startswith(
+        "The recording is not what the model needs: axis joint2: its torque"
+    )
 
 
 def test_a_recording_that_is_right_is_read_as_it_is():
