@@ -15,9 +15,9 @@ from identify.selection.acceptance import Judged
 from identify.selection.trying import Beside, tried_beside
 from twin.core.native import law_address
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.parallel import parallel
+from twin.simulation.simulate import simulate
 
 DURATION = 30.0  # s of each log
 EXPERIMENTS = ("tracking", "moves", "tracking", "moves")

@@ -22,14 +22,14 @@ from identify.demo import DURATION, SELECTION, TEST, TRAINING, hidden_machine
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.experiments.named import simulate
 from twin.export.formats.c import CSource, c_source
 from twin.feedforward import feedforward
 from twin.laws.trials import companion, moderate
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 TITLE = "A model as feedforward"
 STRICT = ("-Wall", "-Wextra", "-Werror", "-std=c99", "-O2")

@@ -12,7 +12,8 @@ import numba
 import numpy as np
 
 from benchmarks.timing import Array
-from twin.core.loop import (
+from twin.model.machine import AxisModel
+from twin.simulation.loop import (
     COMMAND_COLUMN,
     POSITION_COLUMN,
     READING_COLUMN,
@@ -21,7 +22,6 @@ from twin.core.loop import (
     command,
     measure,
 )
-from twin.model.machine import AxisModel
 
 EFFECTS = ("lugre", "cable_slab", "roller_spikes")
 TURN = 2e-5  # m
@@ -85,7 +85,7 @@ def stepped(
     c, masses, dt, motion, state, first, gains, controllers, setpoints, noise,
     signals, forces, states,
 ):  # fmt: skip
-    """Run the reduced model of some axes: what twin.core.loop.run_reduced does, for these laws.
+    """Run the reduced model of some axes as twin.simulation.loop.run_reduced does, for these laws.
 
     c (n_axes, 16); motion (n_axes, 2): x m, v m/s; state (n_axes, 2): z m, direction. The other
     arguments are those of run_reduced.

@@ -18,8 +18,8 @@ from benchmarks import workload
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import Cost, twin
 from benchmarks.workload import MB, Workload, megabytes, saved
-from twin.experiments.named import simulate
 from twin.logs import write_log
+from twin.simulation.simulate import simulate
 
 TITLE = "Commands in passes: CPU of a process, over that of the fused laws over all its samples"
 ROUNDS = 3  # of a command

@@ -209,7 +209,7 @@ def record(slide: Slide, seed: int = 1) -> Recording:
     position, force = np.empty((2, len(t)))
     for k in range(len(t)):
         v = data.qvel[0]
-        position[k] = data.qpos[0] - 0.5 * model.opt.timestep * v  # see twin.core.loop
+        position[k] = data.qpos[0] - 0.5 * model.opt.timestep * v  # see twin.simulation.loop
         force[k] = push[k] + MASS * omega * (omega / 3.0 * (aim[k] - position[k]) + speed[k] - v)
         data.ctrl[0] = force[k]
         mujoco.mj_step(model, data, FINER)

@@ -22,7 +22,7 @@ from twin.experiments.trajectory import AnySetpoint
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import native_address
-from twin.simulator import MujocoSimulator, ReducedSimulator, run
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, run
 
 TITLE = "Simulation: LuGre, cable and roller spikes on both axes, 10 kHz"
 DURATION = 20.0  # s of random tracking
@@ -109,7 +109,7 @@ def measure() -> list[Figure]:
     )
     return [
         Figure(
-            "twin.simulator.run in MuJoCo over a bare compiled mj_step loop of the same mjModel",
+            "a run in MuJoCo over a bare compiled mj_step loop of the same mjModel",
             ratio(bare, whole), "steps/s ratio", Target(low=0.92),
             "whole run: set-up, noise, control, effects, logging",
         ),

@@ -25,10 +25,11 @@ from twin.checks import Fault, LogFinding, Severity, check_log
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import Rests, Steps, Sweep
-from twin.experiments.named import EXPERIMENTS, simulate
+from twin.experiments.named import EXPERIMENTS
 from twin.importers import import_log, load_mapping
 from twin.logs import AxisLog, Log
 from twin.model.file import load_model
+from twin.simulation.simulate import simulate
 
 TITLE = "False alarms of a check on sound logs"
 SEED = 4

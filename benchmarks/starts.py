@@ -34,7 +34,7 @@ from time import perf_counter
 from numba.core import event
 from identify import workflow
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
+from twin import simulate
 from twin.model.file import load_model
 begun = perf_counter()
 with event.install_recorder("numba:run_pass") as recorder:

@@ -20,8 +20,8 @@ from studies.thesis.models import overall
 from studies.thesis.reproduction import reproduce
 from studies.thesis.study import friction_of, machine
 from twin.experiments.kinds import OpenLoopSine
-from twin.experiments.named import simulate
 from twin.model.parameters import ParameterReference, read
+from twin.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ from identify.experiment_design.planting import added_force, other_machine, stre
 from identify.workflow import fit
 from twin.effect import Effect, Excitation
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.logs import Log, write_log
 from twin.logs.log import Array
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
+from twin.simulation.simulate import simulate
 
 DURATION = 30.8  # s of each log; together 1.54 million samples
 LOGS = 5

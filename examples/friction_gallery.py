@@ -18,12 +18,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.core.walks import walk
 from twin.effects import load_catalogue
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, MachineModel, axis_table
-from twin.simulator import ReducedSimulator, run
+from twin.simulation.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
+from twin.simulation.simulators import ReducedSimulator, run
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.model.file import load_model
+from twin.simulation.simulate import simulate
 
 MACHINE = Path(__file__).parent / "drive.toml"
 RUNS = (("moves", 1), ("tracking", 2), ("tracking", 3))  # experiment, seed

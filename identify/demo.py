@@ -22,14 +22,14 @@ from identify.selection.diagnosis import AxisDiagnosis
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.experiments.named import simulate
 from twin.files import make_folder
 from twin.logs import Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.numbers import require_seed
 from twin.parallel import Progress, silent
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 DURATION = 12.0  # s of each log
 BETTER = "better.toml"  # the model with what was found

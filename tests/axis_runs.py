@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from effect_runs import CATALOGUE
 
-from twin.core.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
-from twin.simulator import MujocoSimulator, ReducedSimulator, run
+from twin.simulation.loop import POSITION_COLUMN, VELOCITY_COLUMN, Controller
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, run
 
 RATE = 5000.0  # Hz
 Stepper = type[MujocoSimulator] | type[ReducedSimulator]

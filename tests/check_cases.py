@@ -6,11 +6,11 @@ from functools import cache
 
 from twin.checks import CheckReport, Fault, LogFinding
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.logs.log import Array
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
+from twin.simulation.simulate import simulate
 
 Columns = dict[str, Array]
 

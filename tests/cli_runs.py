@@ -84,5 +84,6 @@ def in_small(*rivals: str, duration: float = 5.0, proposed: int = 4) -> Iterator
         patch("twin.model.file.load_model", slower),
         patch("identify.experiment_design.plan.proposals", fewer),
         patch("twin.experiments.named.DURATION", duration),
+        patch("twin.simulation.simulate.DURATION", duration),
     ):
         yield

@@ -5,9 +5,9 @@ import numpy as np
 from twin.core.compiled import law_address
 from twin.core.walks import walk, walk_sensing
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Hardware, MachineModel, axis_table
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 HARDWARE = Hardware(travel=(-0.1, 0.1), velocity=0.2, acceleration=2.0, jerk=100.0)
 BARE = MachineModel("bare", {"x": AxisModel(1.0, HARDWARE)}, sample_rate=1000.0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 CATALOGUE = load_catalogue()
 PROTON = load_model("proton_xy", CATALOGUE)

@@ -13,10 +13,10 @@ from identify.output.report.subject import Subject
 from identify.results.results import Addition, Comparison, Diagnosis, summary_of
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 HARDWARE = Hardware(
     travel=(-0.1, 0.1), encoder_noise=1e-9, current_noise=1e-3, force_constant=10.0, velocity=0.2,

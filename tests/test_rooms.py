@@ -21,6 +21,12 @@ ROOMS = (
     "validation", "experiment_design", "results", "output", "workflow", "adding", "view", "testing",
     "demo", "cli", "start",
 )  # fmt: skip
+TWIN_ROOMS = (
+    "errors", "files", "entries", "numbers", "signals", "telling", "threads", "parallel",
+    "isolated", "installed", "excitation", "curve", "knee", "effect", "law_parts", "core",
+    "effects", "mujoco", "model", "logs", "checks", "importers", "laws", "feedforward",
+    "experiments", "simulation", "export", "schemas", "examples",
+)  # fmt: skip
 LOG_ROOMS = {"logs", "importers", "checks"}
 MOST_FLOORS = 11  # the table of rules is the lowest: what is decided in a dataset is in it too
 # Functions that tell what a model or a result holds, without its logs.
@@ -58,17 +64,25 @@ def room(module: str) -> str:
     return module.split(".")[1] if "." in module else ""
 
 
+def arrows_of(package: Path) -> dict[str, set[str]]:
+    """A package's modules -> those that they import, its own front door apart."""
+    known, door = modules(package), package.name
+    return {n: set(imports(p, known)) - {door} for n, p in known.items() if n != door}
+
+
 @pytest.fixture(scope="module")
 def arrows() -> dict[str, set[str]]:
-    """identify's modules -> those that they import, its own front door apart."""
-    known = modules(IDENTIFY)
-    return {n: set(imports(p, known)) - {"identify"} for n, p in known.items() if n != "identify"}
+    return arrows_of(IDENTIFY)
 
 
-def test_a_room_imports_only_from_those_before_it(arrows) -> None:
-    assert {room(n) for n in arrows} == set(ROOMS)
+@pytest.mark.parametrize(
+    ("package", "rooms"), [(IDENTIFY, ROOMS), (TWIN, TWIN_ROOMS)], ids=("identify", "twin")
+)
+def test_a_room_imports_only_from_those_before_it(package: Path, rooms: tuple[str, ...]) -> None:
+    arrows = arrows_of(package)
+    assert {room(n) for n in arrows} == set(rooms)
     for name, used in arrows.items():
-        later = [u for u in used if ROOMS.index(room(u)) > ROOMS.index(room(name))]
+        later = [u for u in used if rooms.index(room(u)) > rooms.index(room(name))]
         assert not later, f"{name} imports {', '.join(later)}"
 
 

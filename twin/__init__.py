@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from twin.errors import CannotRun, InputError
     from twin.experiments.experiment import Experiment
     from twin.experiments.file import load_experiment, save_experiment
-    from twin.experiments.named import simulate
     from twin.importers import import_log, load_mapping
     from twin.laws.verdict import check_effect
     from twin.logs import AxisLog, Log, cut_log, read_log, recover_log, write_log
     from twin.model.file import load_model, save_model
     from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+    from twin.simulation.simulate import simulate
 
 HOMES = {
     "twin.effect": ("Effect", "Parameter"),
@@ -33,7 +33,7 @@ HOMES = {
     "twin.errors": ("CannotRun", "InputError"),
     "twin.experiments.experiment": ("Experiment",),
     "twin.experiments.file": ("load_experiment", "save_experiment"),
-    "twin.experiments.named": ("simulate",),
+    "twin.simulation.simulate": ("simulate",),
     "twin.laws.verdict": ("check_effect",),
     "twin.logs": ("AxisLog", "Log", "cut_log", "read_log", "recover_log", "write_log"),
     "twin.checks": ("check_log",),

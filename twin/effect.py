@@ -175,8 +175,8 @@ class Effect:
     """Of a law of any number of elements: the effect with that many. Its parameter ``elements``,
     whose bounds are both that number, tells the law."""
     attach: Callable[[Any, Mapping[str, float]], None] | None = None
-    """Of a structure effect: builds its bodies in MuJoCo, given a twin.mujoco.mjcf.Mount and the
-    values by name. Its first two states are position (m) and speed (m/s) of the joint built."""
+    """Of a structure effect: builds its bodies in MuJoCo, given a Mount (twin.simulation.spec) and
+    the values by name. Its first two states are position (m) and speed (m/s) of the joint built."""
     added_mass: Callable[[Mapping[str, float], float], float] | None = None
     """(values by name, moved mass in kg) -> what the effect adds to the moved mass, kg."""
     sticks: bool = False

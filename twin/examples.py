@@ -65,9 +65,9 @@ def write_example(name: str, folder: Path) -> tuple[Example, list[Path]]:
 
 
 def _hidden_effect(folder: Path) -> None:
-    from twin.experiments.named import simulate
     from twin.logs import write_log
     from twin.model.file import load_model
+    from twin.simulation.simulate import simulate
 
     machine = load_model("example_machine")
     runs = (("fit", "moves"), ("held", "tracking"), ("test", "moves"))
@@ -77,8 +77,8 @@ def _hidden_effect(folder: Path) -> None:
 
 
 def _recording(folder: Path) -> None:
-    from twin.experiments.named import simulate
     from twin.model.file import load_model
+    from twin.simulation.simulate import simulate
 
     recorded = 2000.0  # Hz, of the recording as CSV
     machine = replace(load_model("example_machine"), sample_rate=recorded)

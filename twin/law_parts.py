@@ -375,7 +375,7 @@ def delayed(s, io, slot, delay):
 def oscillator(frequency, ratio, share, dt):
     """Spring and damper of a step of MuJoCo's that swings and decays as the exact motion does.
 
-    In units of the step: 1/dt^2 and 1/dt for a mass of 1. See twin.mujoco.mjcf.Spring.
+    In units of the step: 1/dt^2 and 1/dt for a mass of 1. See twin.simulation.spec.Spring.
     """
     angle = min(2.0 * pi * frequency * dt, 3.0)
     grown = expm1(ratio * angle)

@@ -40,11 +40,11 @@ from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import Moves, Tracking
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
-from twin.simulator import FineSimulator, ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import FineSimulator, ReducedSimulator
 
 STAGE, AXIS = "proton_xy", "x"
 DURATION = 12.0  # s of tracking

@@ -284,7 +284,7 @@ def with_stated(model: MachineModel, catalogue: Catalogue) -> MachineModel:
     """
     if not model.joints:
         return model
-    from twin.mujoco.stated import stated_in  # MuJoCo takes long to load
+    from twin.model.bodies import stated_in  # MuJoCo takes long to load
 
     for axis, attributes in stated_in(model).items():
         for effect in catalogue.values():
@@ -430,12 +430,12 @@ def _untold(axis: str, motions: Sequence[Motion], found: FirstValues) -> InputEr
     if told := _of_constant_force(motions):
         return InputError(
             f"axis {axis}: {names}: {told}; give logs of other forces, or the {units.mass_name} "
-            f"itself, in {units.mass} (--mass), which is then held"
+            f"itself, in {units.mass}, which is then held"
         )
     return InputError(
         f"axis {axis}: {names} cannot tell the {units.mass_name}, as acceleration makes too "
         f"little of the force; give a log with faster changes of speed, or the {units.mass_name} "
-        f"itself, in {units.mass} (--mass), which is then held"
+        f"itself, in {units.mass}, which is then held"
     )
 
 

@@ -63,7 +63,7 @@ def rotors_before_gears(model: MachineModel, log: Log) -> Iterator[RotorBeforeGe
 
 def _gear(model: MachineModel, log: Log, axis: str) -> float:
     """Turns of the motor for one of the joint; 1 where nothing states it."""
-    from twin.mujoco.stated import gear_in  # MuJoCo takes long to load
+    from twin.model.bodies import gear_in  # MuJoCo takes long to load
 
     mapped = tomllib.loads(log.metadata.get(MAP, "")).get("axes", {}).get(axis, {}).get("gear")
     ratio = mapped.get(axis) if isinstance(mapped, dict) else mapped

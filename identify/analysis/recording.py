@@ -159,7 +159,7 @@ class Balance:
 
 def balances(model: MachineModel, log: Log, going: Sequence[str]) -> dict[str, Balance]:
     """By joint that moves, the balance of its torque."""
-    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
+    from twin.model.bodies import mechanism_in  # MuJoCo takes long to load
 
     taken, mechanism, out = bodies_along(model, log, ""), mechanism_in(model), {}
     place, *_ = taken[going[0]].along()
@@ -300,7 +300,7 @@ class WithWeight:
 
     def __call__(self, log: Log) -> Log:
         """The log with them so."""
-        from twin.mujoco.mechanism import mechanism_in
+        from twin.model.bodies import mechanism_in
 
         mechanism = mechanism_in(self.model)
         place = np.stack([log.axes[axis].position for axis in mechanism.axes])

@@ -400,7 +400,8 @@ def plan(
     Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
     """
     from identify import workflow
-    from twin.experiments.file import ENDING, SUFFIX, save_experiment, write_setpoints
+    from twin.experiments.file import SUFFIX, save_experiment
+    from twin.export.setpoints import ENDING, write_setpoints
 
     if out.suffix != SUFFIX:
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")

@@ -57,9 +57,11 @@ def simulate(
     Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
     """
     from identify.output.answers.machine import LogAnswer
-    from twin.experiments.file import SUFFIX, load_experiment, write_setpoints
-    from twin.experiments.named import DURATION, Reach, find_experiment, missed, simulate_parts
+    from twin.experiments.file import SUFFIX, load_experiment
+    from twin.experiments.named import DURATION, find_experiment, missed
+    from twin.export.setpoints import write_setpoints
     from twin.logs import record_log
+    from twin.simulation.simulate import Reach, simulate_parts
 
     stage, _ = loaded(model, effects)
     chosen = load_experiment(experiment) if experiment.endswith(SUFFIX) else experiment

@@ -125,7 +125,7 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
     """
     if not model.joints:
         return {}
-    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
+    from twin.model.bodies import mechanism_in  # MuJoCo takes long to load
 
     mechanism = mechanism_in(model)
     _require_joints(mechanism.axes, model, log, name)

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import settled
-from twin.core.loop import N_SIGNALS, POSITION_COLUMN, Controller, gain_table
 from twin.core.native import Table
 from twin.core.walks import walk
 from twin.effect import Kind
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array, between, local_cubic, local_parabola
-from twin.simulator import ReducedSimulator, Stepper
+from twin.simulation.loop import N_SIGNALS, POSITION_COLUMN, Controller, gain_table
+from twin.simulation.simulators import ReducedSimulator, Stepper
 
 START_FIT = 5e-3  # s on each side of a start from which its position and velocity are taken
 
@@ -202,7 +202,7 @@ class OpenLoopRun:
         model = self.model.with_axis(name, replace(axis, hardware=own.hardware))
         table = model.table()
         simulation = ReducedSimulator(model, table)
-        # The stepped position leads the true one by half a sample (see twin.core.loop).
+        # The stepped position leads the true one by half a sample (see twin.simulation.loop).
         lead = 0.5 * self.period * begin.velocity
         states = begin.states.copy()
         simulation.place(

@@ -32,14 +32,14 @@ from twin.checks import moves
 from twin.effect import Kind
 from twin.errors import CannotRun
 from twin.experiments.experiment import Experiment
-from twin.experiments.named import outside_travel, simulate
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
 from twin.parallel import Progress, silent, spread
 from twin.signals import Array
-from twin.simulator import quickest
+from twin.simulation.simulate import outside_travel, simulate
+from twin.simulation.simulators import quickest
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Arena:
         if len(log) * log.period < SHORTEST_LOG or not moves(log, self.name):
             raise CannotRun(
                 f"axis {self.name} hardly moves, or for less than {SHORTEST_LOG:g} s; give a "
-                "longer --duration (s)"
+                "longer duration (s)"
             )
         # The readings of a simulation err as the effects of the encoder make them, by nothing else.
         errs = bool(parts_of(truth.axis, Kind.SENSING).effects)

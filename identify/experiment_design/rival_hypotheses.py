@@ -19,10 +19,10 @@ from twin.checks import moves
 from twin.effect import Effect, Kind
 from twin.errors import CannotRun, InputError
 from twin.experiments.kinds import Tracking
-from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
-from twin.simulator import quickest
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import quickest
 
 STRENGTH = 10.0  # times the noise floor: assumed force of an effect when there are no logs
 

@@ -10,16 +10,16 @@ import numpy as np
 from identify.analysis.first_model import first_model
 from identify.frequency.plant import Banded, Loop, Plant, loop_of, plant_of
 from identify.frequency.response import Record, Response, response
-from twin.core.loop import Controller
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.experiments.follow import replay
 from twin.logs import Log
 from twin.logs.log import AxisLog
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import Progress, silent
-from twin.simulator import quickest
+from twin.simulation.follow import replay
+from twin.simulation.loop import Controller
+from twin.simulation.simulators import quickest
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,7 +94,7 @@ def departures_of(
     before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
     if all(judged.at_floor for judged in before.values()):
         return nothing
-    from twin.mujoco.mechanism import mechanism_in  # MuJoCo takes long to load
+    from twin.model.bodies import mechanism_in  # MuJoCo takes long to load
 
     mechanism = mechanism_in(model)
     bodies = [Body(mechanism, mechanism.axes.index(axis)) for axis in before]

@@ -25,11 +25,11 @@ from identify.estimation.variable_projection import usable
 from identify.rules import RULE
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
-from twin.experiments.named import simulate
 from twin.model.machine import MachineModel
 from twin.model.parameters import ParameterReference, all_parameters, free_parameters, read, write
 from twin.signals import Array
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 
 @dataclass(frozen=True)

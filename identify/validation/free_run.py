@@ -27,7 +27,7 @@ from twin.core.native import LAST_ACCELERATION, LAST_VELOCITY
 from twin.errors import CannotRun
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_cubic
-from twin.simulator import MujocoSimulator, ReducedSimulator, Stepper
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, Stepper
 from twin.telling import tell
 
 HORIZON = 0.5  # s between restarts
@@ -84,7 +84,7 @@ def free_run(
     for start, end, state, x, v, a in begun:
         state[table.axes[:, 2] + LAST_ACCELERATION] = a
         state[table.axes[:, 2] + LAST_VELOCITY] = v - period * a
-        # The stepped position leads the true one by half a sample (see twin.core.loop).
+        # The stepped position leads the true one by half a sample (see twin.simulation.loop).
         simulation.place(x + 0.5 * period * v, v, state, int(start), origin)
         span = slice(start, end)
         simulated = open_loop(model, table, simulation, int(start), command[span])

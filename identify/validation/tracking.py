@@ -16,7 +16,6 @@ import numpy as np
 from identify.dataset.given_logs import shortness
 from identify.estimation.evidence import rms
 from twin.checks import moves
-from twin.core.loop import POSITION_COLUMN, Controller
 from twin.effect import Kind
 from twin.experiments.trajectory import Setpoint
 from twin.feedforward import feedforward, followed
@@ -24,7 +23,8 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, silent
 from twin.signals import Array, between, moving_mean, rate
-from twin.simulator import ReducedSimulator, run
+from twin.simulation.loop import POSITION_COLUMN, Controller
+from twin.simulation.simulators import ReducedSimulator, run
 
 
 @dataclass(frozen=True)

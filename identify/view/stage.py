@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 
 from identify.view.replay import Replay
+from twin.model.bodies import mechanism_in
 from twin.model.machine import MachineModel
-from twin.mujoco.mechanism import mechanism_in, read_bodies
-from twin.mujoco.mjcf import machine_spec, read_spec
+from twin.mujoco.reading import read_bodies, read_spec
 from twin.signals import Array
+from twin.simulation.spec import machine_spec
 
 GHOST = (0.20, 0.55, 1.00, 0.40)  # of the modelled machine, red green blue alpha
 MARK = (1.00, 0.45, 0.05, 1.0)  # of the setpoint

@@ -14,14 +14,14 @@ import numpy as np
 from identify.dataset.motion import motion_of
 from studies.curves.velocity_map import VelocityMap
 from studies.thesis.study import Array, Numbers, followed, seed_of
-from twin.core.loop import Controller
 from twin.experiments.kinds import Staircase
-from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.signals import rate
-from twin.simulator import FineSimulator
+from twin.simulation.loop import Controller
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import FineSimulator
 
 RATE = 1000.0  # Hz
 SPEEDS, SPAN = (0.001, 0.003, 0.01, 0.03, 0.1), 0.02  # m/s, m, of the map

@@ -16,10 +16,10 @@ from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers
 from twin.experiments.kinds import Passes
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.machine import AxisModel
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 TITLE = "Cable slab"
 SPEED, SPAN = 0.1, 0.3  # m/s, m

@@ -30,12 +30,12 @@ from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import Array, Found, Numbers, friction_of
-from twin.core.loop import Controller
 from twin.effect import Kind
 from twin.experiments.kinds import OpenLoopSine, Reversals
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read, write
+from twin.simulation.loop import Controller
 
 TITLE = "Dynamic parameters"
 AMPLITUDE, PERIOD = 0.21, 3.0  # N, s, of the thesis's sine

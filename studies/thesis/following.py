@@ -15,13 +15,13 @@ from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.intervals import scatter
-from twin.core.loop import Controller
-from twin.experiments.follow import replay
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.signals import Array, local_parabola, rate
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.follow import replay
+from twin.simulation.loop import Controller
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 SMOOTHED = 10e-3  # s, over which positions are smoothed before they are differentiated
 

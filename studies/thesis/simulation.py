@@ -27,11 +27,11 @@ from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of
 from twin.experiments.kinds import Reversals, Staircase
-from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, write
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 TITLE = "Simulation study"
 STATIC = ("Fc", "Fs", "v0", "sigma2")

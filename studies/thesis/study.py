@@ -15,18 +15,18 @@ from identify.dataset.preparation import datasets
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, error_on
 from identify.output.report.page import Block
-from twin.core.loop import Controller
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.experiment import Experiment
-from twin.experiments.follow import follow_parts
-from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log
 from twin.logs.log import joined
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
-from twin.simulator import FineSimulator
+from twin.simulation.follow import follow_parts
+from twin.simulation.loop import Controller
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import FineSimulator
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]

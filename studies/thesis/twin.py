@@ -21,7 +21,7 @@ from studies.thesis import study
 from studies.thesis.following import closed_loop_errors, identified, twin_of
 from studies.thesis.study import CATALOGUE, Found
 from twin.model.machine import Fitted, MachineModel
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 TITLE = "Twin against machine"
 HEAVIER = 0.01  # of the mass, by which the changed machine differs

@@ -10,10 +10,10 @@ from benchmarks.workload import Workload
 from twin.core.walks import walk_sets
 from twin.effects import load_catalogue
 from twin.experiments.kinds import Tracking
-from twin.experiments.named import simulate
 from twin.model.file import load_model
 from twin.model.machine import axis_table
-from twin.simulator import ReducedSimulator, run
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator, run
 
 MODEL = load_model("proton_xy", load_catalogue())
 

@@ -15,11 +15,11 @@ from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import diagnose_axis
 from twin.effects import load_catalogue
 from twin.errors import CannotRun, InputError
-from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import Log, read_log, write_log
 from twin.model.machine import Fitted, MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 AREA = 5.3e-4  # m^2, of a piston
 MODEL = MachineModel("cylinder", {"x": SLIDE}, RATE)

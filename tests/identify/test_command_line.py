@@ -27,10 +27,10 @@ from twin.checks import check_log
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.experiments.file import load_experiment
-from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log, read_log, write_log
 from twin.model.file import load_model, models_folder, save_model
 from twin.model.machine import MachineModel
+from twin.simulation.simulate import simulate
 
 STAGE = (models_folder() / "proton_xy.toml").read_text()
 
@@ -63,7 +63,7 @@ def folder(recorded, tmp_path) -> Path:
     ("command", "said"),
     [
         ("effects coging", ["'cogging'"]),
-        ("effects my_effect", ["--effects FILE adds your own"]),
+        ("effects my_effect", ["a file of your own can be added"]),
         ("simulate traking", ["'tracking'"]),
         ("add coging proton_xy log.mcap -o b.toml", ["'cogging'"]),
         ("fit proton_yx log.mcap", ["proton_xy.toml"]),

@@ -25,12 +25,12 @@ from identify.estimation.fit import error_on
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.examples import EXAMPLES, examples_folder, write_example
-from twin.experiments.named import simulate
 from twin.importers import load_mapping
 from twin.logs import read_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 ROOT = Path(__file__).parent.parent.parent
 

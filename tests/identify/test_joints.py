@@ -43,12 +43,12 @@ from identify.workflow import compare, diagnose, fit, plan
 from twin.effects import Catalogue, load_catalogue
 from twin.experiments.file import setpoint_of
 from twin.experiments.kinds import Passes, Tracking, kind_of
-from twin.experiments.named import simulate
 from twin.logs import Log, read_log, write_log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.mujoco.mechanism import joints_of
-from twin.simulator import MujocoSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import MujocoSimulator
 
 RIVALS = ("gravity", "spring")
 LOCAL = "position_dependent_friction"

@@ -137,7 +137,7 @@ def test_a_mass_that_the_logs_do_not_tell_is_given_and_held(tmp_path, units, nam
     write_log(slow(units), tmp_path / "run.mcap")
     told = refusal("new", "run.mcap", "-o", "m.toml", folder=tmp_path)
     unit = "kg m^2" if name == "inertia" else "kg"
-    assert f"or the {name} itself, in {unit} (--mass), which is then held" in told
+    assert f"or the {name} itself, in {unit}, which is then held" in told
     for given in ("3.25", "a=3.25"):
         done = twin("new", "run.mcap", "-o", "m.toml", "--mass", given, folder=tmp_path)
         assert done.returncode == 0, done.stderr

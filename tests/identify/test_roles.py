@@ -24,10 +24,10 @@ from identify.selection.diagnosis import Verdict
 from identify.workflow import diagnose
 from twin.effects import Catalogue
 from twin.errors import InputError
-from twin.experiments.named import simulate
 from twin.logs import Log
 from twin.model.file import load_model
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 STAGE = replace(one_axis(load_model("proton_xy", CATALOGUE)), sample_rate=2000.0)
 PULLED = STAGE.with_axis("x", STAGE.axes["x"].with_effect(effect("quadratic_drag", {"c": 30.0})))

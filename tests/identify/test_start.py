@@ -215,7 +215,7 @@ from dataclasses import replace
 from identify import workflow
 from identify.cli.command import progress_on_stderr
 from twin.effects import Catalogue, load_catalogue
-from twin.experiments.named import simulate
+from twin.simulation.simulate import simulate
 from twin.model.file import load_model
 model = load_model("proton_xy", load_catalogue())
 model = replace(model, sample_rate=2500.0)

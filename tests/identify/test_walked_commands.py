@@ -15,8 +15,8 @@ import pytest
 from cli_runs import Done, twin
 
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.model.file import load_model
+from twin.simulation.simulate import simulate
 
 DRIVE = Path(__file__).parents[2] / "examples" / "drive.toml"
 RATE = 500.0  # Hz, of the recordings

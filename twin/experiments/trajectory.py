@@ -9,7 +9,7 @@ metres they amount to 10 nm, too much for a move of micrometres.
 Source of the planner: L. Berscheid and T. Kroeger, "Jerk-limited Real-time Trajectory Generation
 with Arbitrary Target States", Robotics: Science and Systems XVII, 2021. The profile is this
 project's assumption: the thesis prints no generator of its motion platform. A recorded reference
-replaces it (``recorded_setpoint`` in twin.experiments.follow).
+replaces it (``recorded_setpoint`` in twin.simulation.follow).
 """
 
 from __future__ import annotations

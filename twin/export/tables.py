@@ -14,7 +14,6 @@ import numpy as np
 
 from twin.effect import Kind
 from twin.errors import InputError
-from twin.experiments.follow import recorded_setpoint
 from twin.experiments.named import find_experiment
 from twin.experiments.trajectory import AnySetpoint
 from twin.export import Exported, Held, Loss, Remark, axis_identifiers
@@ -22,6 +21,7 @@ from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
+from twin.simulation.follow import recorded_setpoint
 
 ENTRIES = 256  # of one period
 EXPERIMENT, DURATION, SEED = "moves", 10.0, 1  # the motion that tells losses where no log is given

@@ -29,44 +29,15 @@ import mujoco
 import numpy as np
 
 from twin.core.compiled import call_at, compiled
-from twin.errors import CannotRun, InputError
-from twin.model.machine import MachineModel
-from twin.mujoco.callback import Driven, native_address, offsets, view, word_at
-from twin.mujoco.mjcf import add_motor, read_spec
+from twin.errors import InputError
+from twin.mujoco.callback import native_address, offsets, view, word_at
+from twin.mujoco.reading import read_bodies
 from twin.mujoco.transmission import HINGE, SLIDE, Transmission, transmission_of
 from twin.signals import Array
 
 CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
 AHEAD = 1e-6  # rad or m, by which the joints move on, of the change of the mass matrix
 PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of an axis, which are effects here
-
-
-def read_bodies(text: str, name: str) -> mujoco.MjSpec:
-    """The spec of an MJCF or URDF text, less the geometry that the bodies' inertia does not need.
-
-    name: of the file, for messages. Raises InputError where MuJoCo cannot read it.
-    """
-    spec = read_spec(text, name)
-    spec.compiler.fusestatic = False  # a body keeps its name
-    least_inertia = 1e-9  # kg, kg m^2: of a body whose file rounds its inertia to 0
-    spec.compiler.boundmass = spec.compiler.boundinertia = least_inertia
-    spec.compiler.balanceinertia = True
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    for body in spec.bodies[1:]:
-        if not body.explicitinertial and any(_is_mesh(g) and g.mass != 0.0 for g in body.geoms):
-            raise InputError(
-                f"{name}: body '{body.name}' has its inertia from a mesh alone; give it an "
-                "inertial element with mass (kg), pos (m) and inertia (kg m^2)"
-            )
-    for geom in [g for g in spec.geoms if _is_mesh(g) or g.parent.explicitinertial]:
-        spec.delete(geom)
-    for part in (*spec.meshes, *spec.hfields, *spec.skins, *spec.materials, *spec.textures):
-        spec.delete(part)
-    return spec
-
-
-def _is_mesh(geom: mujoco.MjsGeom) -> bool:
-    return geom.type in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,15 +164,10 @@ def mechanism_of(text: str, name: str, joints: Mapping[str, str]) -> Mechanism:
     return _mechanism(text, name, tuple(joints.items()))
 
 
-def mechanism_in(model: MachineModel) -> Mechanism:
-    """The mechanism of a machine whose axes are joints; raises InputError as ``mechanism_of``."""
-    return mechanism_of(model.mjcf or "", model.mjcf_name or "", model.joints)
-
-
 @lru_cache(maxsize=4)  # each command asks for that of its one model several times
 def _mechanism(text: str, name: str, joints: tuple[tuple[str, str], ...]) -> Mechanism:
     spec = read_bodies(text, name)
-    _strip(spec, dict(joints).values())
+    strip_passive(spec, dict(joints).values())
     try:
         model = spec.compile()
     except ValueError as error:
@@ -255,49 +221,9 @@ def _inertias(model: mujoco.MjModel, joints: Transmission) -> tuple[Array, Array
     return total, least
 
 
-def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
-    """The spec of a machine whose axes are joints: its bodies, a motor each, and the rotors.
-
-    The file's own motors, sensors and limits are not there: the machine model has its own. Raises
-    CannotRun for an effect that hangs bodies on a joint.
-    """
-    name = model.mjcf_name or ""
-    spec = read_bodies(model.mjcf or "", name)
-    for part in (*spec.actuators, *spec.sensors, *spec.keys):
-        spec.delete(part)
-    spec.option.timestep = model.period
-    for part in _strip(spec, model.joints.values()):
-        part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-    for tie in spec.equalities:
-        tie.solref[:] = 2.0 * model.period, 1.0  # as stiff as can be: its give is not identified
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    for axis, own in model.axes.items():
-        for f in own.effects:
-            if f.effect.attach is not None and f.effect.is_present(f.values):
-                raise CannotRun(
-                    f"axis {axis}: {f.effect.name} hangs bodies on a joint of {name}, which is not "
-                    "simulated; put the body and its spring into that file"
-                )
-        part = spec.joint(own.joint) or spec.tendon(own.joint)
-        part.armature = own.weighed.mass - own.mass
-        add_motor(spec, axis, own.joint or axis)
-    return spec
-
-
-def driven(model: MachineModel) -> list[Driven]:
-    """The axes of such a spec.
-
-    Friction stops a joint by the least inertia that it may have: more than it has would throw it
-    back and forth, less stops it a little later.
-    """
-    found = mechanism_in(model)
-    return [
-        Driven(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
-        for (name, axis), least in zip(model.axes.items(), found.freed, strict=True)
-    ]
-
-
-def _strip(spec: mujoco.MjSpec, axes: Collection[str]) -> list[mujoco.MjsJoint | mujoco.MjsTendon]:
+def strip_passive(
+    spec: mujoco.MjSpec, axes: Collection[str]
+) -> list[mujoco.MjsJoint | mujoco.MjsTendon]:
     """Take what is the matter of effects from the joints and from the tendons that are axes."""
     parts = [*spec.joints, *(t for t in spec.tendons if t.name in axes)]
     for part in parts:

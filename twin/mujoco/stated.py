@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 
 from twin.errors import InputError
-from twin.model.machine import MachineModel
-from twin.mujoco.mechanism import read_bodies
+from twin.mujoco.reading import read_bodies
 
 # By attribute what holds it in a compiled model, of a joint and of a tendon; of what may be a
 # polynomial its linear part.
@@ -34,20 +33,6 @@ def stated(text: str, name: str, joints: Mapping[str, str]) -> dict[str, dict[st
     """
     found = _stated(text, name, (*joints.values(),))
     return {axis: dict(own) for axis, own in zip(joints, found, strict=True)}
-
-
-def stated_in(model: MachineModel) -> dict[str, dict[str, float]]:
-    """The same of the file of a machine; nothing of one whose axes are no joints."""
-    return stated(model.mjcf or "", model.mjcf_name or "", model.joints) if model.joints else {}
-
-
-def gear_in(model: MachineModel, axis: str) -> float:
-    """The gear of the motor of a joint in the file of a machine; 1 where it has none."""
-    built = read_bodies(model.mjcf or "", model.mjcf_name or "").compile()
-    joint = mujoco.mj_name2id(built, mujoco.mjtObj.mjOBJ_JOINT, model.joints[axis])
-    of_joints = built.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-    own = np.flatnonzero(of_joints & (built.actuator_trnid[:, 0] == joint))
-    return float(built.actuator_gear[own[0], 0]) if joint >= 0 and len(own) else 1.0
 
 
 @lru_cache(maxsize=4)  # of one model it is asked several times

@@ -17,7 +17,7 @@ import numpy as np
 
 from twin.errors import InputError
 from twin.mujoco.callback import Parts, parts_of, tendon_parts
-from twin.mujoco.mjcf import read_spec
+from twin.mujoco.reading import read_spec
 from twin.numbers import SINGULAR, independent
 from twin.signals import Array
 

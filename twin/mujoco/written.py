@@ -20,7 +20,7 @@ def in_mjcf(text: str, name: str) -> str:
     """The text itself, or what a URDF text is in MJCF."""
     if "<mujoco" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL).lstrip()[:200]:
         return text
-    from twin.mujoco.mechanism import read_bodies  # MuJoCo takes long to load
+    from twin.mujoco.reading import read_bodies  # MuJoCo takes long to load
 
     spec = read_bodies(text, name)
     spec.compile()

@@ -41,7 +41,7 @@ from twin.errors import InputError
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 RATE = 2000.0  # Hz
 T = np.arange(4000) / RATE
@@ -174,8 +174,7 @@ def test_an_axis_that_rests_in_every_window_is_refused_in_one_line(tmp_path):
         told = one_line(command, PLAIN, {"log": log}, test_function=0.1)
         assert told.startswith("log: axis x comes to rest within every test function of 0.1 s")
         assert (
-            "give a log in which it moves for longer at a time, or a shorter --test-function"
-            in told
+            "give a log in which it moves for longer at a time, or shorter test functions" in told
         )
     save_model(PLAIN, tmp_path / "model.toml")
     write_log(log, tmp_path / "log.mcap")

@@ -20,13 +20,13 @@ from identify.estimation.simulated_motion import MotionFit, fit_simulated_motion
 from identify.output.words.fit import HELD_OUT_GREW, motion_fit_in_words
 from twin.errors import InputError
 from twin.experiments.kinds import OpenLoopSine
-from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.model.parameters import free_parameters, read, write
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 RATE = 1000.0

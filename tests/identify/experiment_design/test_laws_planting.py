@@ -39,7 +39,7 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.model.parameters import free_parameters, read
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 LOGS = [
     windowed(moved(np.random.default_rng(s), 1.0, 1000.0).head(n)) for s, n in ((1, 0.5), (2, 0.3))

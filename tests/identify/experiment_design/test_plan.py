@@ -39,13 +39,14 @@ from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
-from twin.experiments.named import ALLOWED, simulate
+from twin.experiments.named import ALLOWED
 from twin.logs import AxisLog, Log
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.numbers import neat
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 Logs = dict[str, Log]
 RATE = 2500.0  # Hz, of the machines that are identified: quicker than 10 kHz, and enough

@@ -21,11 +21,11 @@ from identify.output.as_json import answer_of
 from tests.cli_runs import refusal, twin
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import Fitted, MachineModel
 from twin.signals import Array
+from twin.simulation.simulate import simulate
 
 SAMPLES = 16_000
 MACHINE = TwoMasses()

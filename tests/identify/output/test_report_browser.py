@@ -15,9 +15,9 @@ from report_cases import Case
 
 from identify import workflow
 from twin.effects import Catalogue, load_catalogue
-from twin.experiments.named import simulate
 from twin.model.machine import Fitted
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 
 @pytest.fixture(scope="module")

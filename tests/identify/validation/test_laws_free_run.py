@@ -15,7 +15,7 @@ from identify.estimation.open_loop import START_FIT
 from identify.validation.comparison import side_by_side
 from identify.validation.free_run import HORIZON, FreeRun, free_run, rms_error
 from twin.model.machine import AxisModel, Hardware, MachineModel
-from twin.simulator import MujocoSimulator, ReducedSimulator
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
 RATE, MASS = 1000.0, 1.7
 N = 1730

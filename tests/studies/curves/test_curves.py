@@ -36,13 +36,13 @@ from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.experiments import kinds
 from twin.experiments.kinds import OpenLoopSine, Reversals, Staircase
-from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.model.parameters import free_parameters
-from twin.simulator import FineSimulator, ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import FineSimulator, ReducedSimulator
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LOCAL = Fitted.at_start(CATALOGUE["position_dependent_friction"], {"c1": 0.06})

@@ -14,7 +14,7 @@ from identify.dataset.motion import motion_of
 from identify.testing import assert_agree
 from studies.thesis.following import closed_loop_errors, identified, twin_of
 from twin.model.machine import MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulators import ReducedSimulator
 
 RATE = 1000.0
 DRIVE = replace(axis_of(fitted("constant_force")), hardware=replace(HARDWARE, travel=(-0.1, 0.1)))

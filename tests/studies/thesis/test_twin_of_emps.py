@@ -19,12 +19,12 @@ from scipy.io import loadmat
 from identify.testing import assert_agree
 from identify.workflow import agree
 from studies.thesis.following import closed_loop_errors, identified, twin_of
-from twin.core.loop import Controller
-from twin.experiments.follow import recorded_setpoint
 from twin.importers import import_log, load_mapping
 from twin.logs import Log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
+from twin.simulation.follow import recorded_setpoint
+from twin.simulation.loop import Controller
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 WINDOW = 0.2  # s

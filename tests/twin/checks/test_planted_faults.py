@@ -16,9 +16,9 @@ import pytest
 from check_cases import Columns, clean_log, faults, milliseconds, only, stage, with_axis
 
 from twin.checks import Fault, check_log
-from twin.experiments.named import simulate
 from twin.logs import FIELDS, Log
 from twin.logs.log import Array
+from twin.simulation.simulate import simulate
 
 Plant = Callable[[Log], Log]
 DRIVEN = ("force", "current")

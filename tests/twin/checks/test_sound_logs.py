@@ -14,10 +14,10 @@ import pytest
 from check_cases import clean_log, faults, milliseconds, stage
 
 from twin.checks import Fault, check_log
-from twin.experiments.named import simulate
 from twin.importers import import_log, load_mapping
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 from twin.logs.log import Array
+from twin.simulation.simulate import simulate
 
 EMPS_MAP = Path(__file__).parents[3] / "examples" / "import_emps.toml"
 

@@ -14,13 +14,13 @@ from effect_runs import FRICTIONS
 from machines import CATALOGUE, PROTON
 
 from twin.effect import DRY, INDEX, OUT, READING, TIME, VISCOUS, Effect, Kind, Parameter, V, X
-from twin.experiments.named import simulate
 from twin.laws import checks, physics
 from twin.laws.checks import LawBroken
 from twin.laws.trials import absent, moderate
 from twin.laws.verdict import LAWS, Law
 from twin.logs import Log
 from twin.model.machine import Fitted
+from twin.simulation.simulate import simulate
 
 # What a modifier does to the work of every friction is tried from the friction's side.
 PAIRS = [

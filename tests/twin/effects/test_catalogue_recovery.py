@@ -26,9 +26,9 @@ from identify.experiment_design.planting import added_force, draw_effect
 from identify.selection.candidates import Candidate
 from identify.selection.trying import try_effect
 from twin.effect import Effect, Kind
-from twin.experiments.named import simulate
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 HARDWARE = Hardware(
     travel=(-0.17, 0.17), force_constant=53.4, encoder_noise=1e-9, current_noise=2e-4,

@@ -11,18 +11,13 @@ from import_cases import csv_columns
 from identify.cli.shared import app
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.experiments.file import (
-    format_experiment,
-    load_experiment,
-    parameters,
-    save_experiment,
-    write_setpoints,
-)
+from twin.experiments.file import format_experiment, load_experiment, parameters, save_experiment
 from twin.experiments.kinds import Moves, OpenLoopSine, Passes, Rests, Steps, Sweep
-from twin.experiments.named import simulate
+from twin.export.setpoints import write_setpoints
 from twin.logs import read_log
 from twin.model.file import load_model
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 CATALOGUE = load_catalogue()
 PROTON = load_model("proton_xy", CATALOGUE)

@@ -39,13 +39,13 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.experiments.file import format_experiment
 from twin.experiments.kinds import Passes
-from twin.experiments.named import simulate
 from twin.logs import Log, read_log, write_log
 from twin.model.file import format_model, parse_model
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits, units_of
-from twin.mujoco.mjcf import machine_spec
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
+from twin.simulation.spec import machine_spec
 
 TRIED = ("cogging", "constant_force", "quadratic_drag", "axis_coupling")
 DURATION = 4.0  # s of each log

@@ -10,10 +10,10 @@ from identify import adding, workflow
 from twin.effect import Kind
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
-from twin.experiments.named import simulate
 from twin.logs import AxisLog, Log
 from twin.model.file import format_model, load_model, save_model
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.simulation.simulate import simulate
 
 RATE = 1000.0  # Hz
 YIELDS = {"Fc": 9e5, "sigma2": 2e5, "sigma0": 4e8}  # of a large damper

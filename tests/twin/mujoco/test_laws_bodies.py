@@ -11,7 +11,7 @@ from axis_runs import effect
 from twin.errors import InputError
 from twin.model.file import load_model, models_folder
 from twin.model.machine import AxisModel, MachineModel
-from twin.mujoco.mjcf import attached_joint, machine_spec
+from twin.simulation.spec import attached_joint, machine_spec
 
 PERIOD = 2e-4  # s
 STAGE = load_model("proton_xy")

@@ -17,7 +17,7 @@ from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.mujoco.callback import MAGIC, passive_callback
 from twin.signals import Array
-from twin.simulator import MujocoSimulator
+from twin.simulation.simulators import MujocoSimulator
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS

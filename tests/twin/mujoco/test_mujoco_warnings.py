@@ -16,7 +16,7 @@ from twin.errors import CannotRun
 from twin.experiments.trajectory import Setpoint
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.mujoco.callback import collected_warnings
-from twin.simulator import run
+from twin.simulation.simulators import run
 
 EACH = pytest.mark.parametrize("simulator", BOTH)
 

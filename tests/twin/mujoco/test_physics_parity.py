@@ -11,12 +11,12 @@ from effect_runs import with_all
 from machines import CATALOGUE, PROTON
 
 from twin.effect import Effect
-from twin.experiments.named import simulate
 from twin.laws.trials import moderate
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.signals import Array
-from twin.simulator import MujocoSimulator, ReducedSimulator, run
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, run
 
 
 def smooth(model: MachineModel) -> MachineModel:

@@ -28,7 +28,7 @@ from twin.feedforward import imposed
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.mujoco.mechanism import PASSIVE
-from twin.mujoco.mjcf import read_spec
+from twin.mujoco.reading import read_spec
 from twin.mujoco.stated import stated
 from twin.mujoco.written import in_mjcf, with_joint, with_motor
 from twin.signals import Array, between
@@ -45,7 +45,7 @@ def export(model: MachineModel, logs: Mapping[str, Log]) -> Exported:
     if model.mjcf is None:
         raise InputError(
             f"{model.name}: has no MuJoCo file to write back; give the model mujoco = 'robot.xml', "
-            "or begin with `twin new LOG --mjcf robot.xml`"
+            "or make the first model of an MJCF file (`twin new`)"
         )
     name = model.mjcf_name or "model.xml"
     text = in_mjcf(model.mjcf, name)

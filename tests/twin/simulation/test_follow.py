@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from constructed import CATALOGUE, effect, two_waves
 
-from twin import simulator
 from twin.errors import InputError
-from twin.experiments.follow import follow_parts, recorded_setpoint, replay
-from twin.experiments.named import simulate
 from twin.experiments.trajectory import Setpoint
 from twin.logs import AxisLog, Log
 from twin.logs.log import joined
 from twin.model.file import load_model, parse_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
-from twin.simulator import ReducedSimulator
+from twin.simulation import simulators
+from twin.simulation.follow import follow_parts, recorded_setpoint, replay
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 RATE, N = 1000.0, 250
 QUIET = Hardware(encoder_noise=0.0, current_noise=0.0, force_constant=13.0)
@@ -41,7 +41,7 @@ def follow(model: MachineModel, wanted: Setpoint, seed: int = 0) -> Log:
 def test_every_column_is_the_signal_that_it_names():
     model, wanted = model_of(), two_waves(N)
     log = follow(model, wanted)
-    run = simulator.run(model, wanted, noise()[0], simulator=ReducedSimulator)
+    run = simulators.run(model, wanted, noise()[0], simulator=ReducedSimulator)
     assert log.sample_rate == RATE
     for i, (name, axis) in enumerate(log.axes.items()):
         reading, command, position, velocity = run.signals[:, i].T

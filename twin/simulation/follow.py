@@ -12,13 +12,6 @@ from copy import deepcopy
 import numpy as np
 from numpy.random import Generator
 
-from twin.core.loop import (
-    COMMAND_COLUMN,
-    POSITION_COLUMN,
-    READING_COLUMN,
-    VELOCITY_COLUMN,
-    Controller,
-)
 from twin.errors import InputError
 from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.logs import AxisLog, Log
@@ -27,7 +20,14 @@ from twin.logs.writer import software_version
 from twin.model.file import format_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.signals import Array, rate
-from twin.simulator import MujocoSimulator, Progress, Run, Simulator, run_parts
+from twin.simulation.loop import (
+    COMMAND_COLUMN,
+    POSITION_COLUMN,
+    READING_COLUMN,
+    VELOCITY_COLUMN,
+    Controller,
+)
+from twin.simulation.simulators import MujocoSimulator, Progress, Run, Simulator, run_parts
 
 
 def follow_parts(

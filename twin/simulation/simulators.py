@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.compiled import S_AT
-from twin.core.loop import N_SIGNALS, Controller, gain_table, run_mujoco, run_reduced
 from twin.core.native import Table
 from twin.errors import CannotRun, InputError
 from twin.experiments.trajectory import AnySetpoint, Setpoint
@@ -26,6 +25,7 @@ from twin.mujoco.callback import (
     offsets,
     passive_callback,
 )
+from twin.simulation.loop import N_SIGNALS, Controller, gain_table, run_mujoco, run_reduced
 
 Array = NDArray[np.float64]
 
@@ -84,8 +84,8 @@ class MujocoSimulator:
     def __init__(self, model: MachineModel, table: Table) -> None:
         import mujoco
 
-        from twin.mujoco.mechanism import driven, jointed_spec, mechanism_in
-        from twin.mujoco.mjcf import machine_spec
+        from twin.model.bodies import mechanism_in
+        from twin.simulation.spec import driven, jointed_spec, machine_spec
 
         self._transmission = None
         if model.joints:
@@ -108,7 +108,7 @@ class MujocoSimulator:
         """For each joint that a structure effect built: qpos, dof, the effect's first state."""
         import mujoco
 
-        from twin.mujoco.mjcf import attached_joint
+        from twin.simulation.spec import attached_joint
 
         rows, kind = [], mujoco.mjtObj.mjOBJ_JOINT
         for label, entry in zip(self._table.labels, self._table.entries, strict=True):
@@ -286,7 +286,7 @@ def _carried(model: MachineModel, setpoint: Setpoint) -> Array | float:
     """
     if not model.joints:
         return 0.0
-    from twin.mujoco.mechanism import mechanism_in
+    from twin.model.bodies import mechanism_in
 
     mechanism = mechanism_in(model)
     bodies = mechanism.carried(setpoint.position.T, setpoint.acceleration.T).T
@@ -322,7 +322,7 @@ def require_sound(
 ) -> None:
     """Raise CannotRun where a signal is not finite, or huge; ``first``: number of sample 0.
 
-    signals (n, n_axes, 4) and forces (n, n_entries) as in twin.simulator.Run.
+    signals (n, n_axes, 4) and forces (n, n_entries) as in ``Run``.
     """
     bad = _bad(signals)
     samples = np.flatnonzero(bad.any(axis=(1, 2)))

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from constructed import effect, two_waves
 
-from twin import simulator
-from twin.core.loop import N_SIGNALS, READING_COLUMN, Controller, gain_table
 from twin.effect import INDEX, OUT, READING, TIME, Effect, Kind
 from twin.entries import read_toml, shown, toml_document
 from twin.errors import CannotRun, InputError, at
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
-from twin.simulator import MujocoSimulator, ReducedSimulator, run, run_parts
+from twin.simulation import simulators
+from twin.simulation.loop import N_SIGNALS, READING_COLUMN, Controller, gain_table
+from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, run, run_parts
 
 RATE = 1000.0
 EFFECTS = {
@@ -28,7 +28,7 @@ MODEL = MachineModel(
 @pytest.mark.parametrize("stage", [ReducedSimulator, MujocoSimulator])
 def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
     """The same seed draws the same noise, part by part; what comes later changes nothing."""
-    chunk, more, told = simulator.CHUNK, 500, []
+    chunk, more, told = simulators.CHUNK, 500, []
     n = 2 * chunk + more
     wanted = two_waves(n)
     whole = run(
@@ -48,7 +48,7 @@ def test_a_run_in_parts_is_the_same_run_and_tells_how_far_it_is(stage):
 def test_states_are_logged_under_their_names_where_they_are_few():
     done = run(MODEL, two_waves(200), np.random.default_rng(1), simulator=ReducedSimulator)
     states = {f.effect.name: f.effect.states for axis in EFFECTS.values() for f in axis}
-    assert len(states["gms"]) > simulator.WATCHED_STATES
+    assert len(states["gms"]) > simulators.WATCHED_STATES
     wanted = {("x", f"lugre_{s}") for s in states["lugre"]}
     wanted |= {("y", f"actuator_lag_{s}") for s in states["actuator_lag"]}
     assert set(done.state_names) == wanted

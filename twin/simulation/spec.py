@@ -1,4 +1,7 @@
-"""The MuJoCo model of a machine: its masses set, and the bodies of structure effects attached."""
+"""The MuJoCo spec of a machine: its masses set, and the bodies of structure effects attached.
+
+Of plain axes (``machine_spec``), and of axes that are joints of a mechanism (``jointed_spec``).
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.errors import InputError
+from twin.errors import CannotRun, InputError
+from twin.model.bodies import mechanism_in
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits
+from twin.mujoco.callback import Driven
+from twin.mujoco.mechanism import strip_passive
+from twin.mujoco.reading import read_bodies, read_spec
 
 # A joint of its own: no limits, whatever the defaults of the machine's file.
 FREE = {
@@ -222,17 +229,6 @@ def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
     return mass
 
 
-def read_spec(text: str, name: str) -> mujoco.MjSpec:
-    """The spec of an MJCF or URDF text; InputError, that names the file, where it is none."""
-    try:
-        return mujoco.MjSpec.from_string(text)
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise InputError(
-            f"{name}: is not an MJCF or URDF file that MuJoCo reads: {said}"
-        ) from error
-
-
 def _require_bare(
     model: MachineModel, axis: str, joint: mujoco.MjsJoint, motor: mujoco.MjsActuator
 ) -> None:
@@ -276,3 +272,45 @@ def _plain_joints(model: MachineModel) -> mujoco.MjSpec:
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         add_motor(spec, name, name)
     return spec
+
+
+def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
+    """The spec of a machine whose axes are joints: its bodies, a motor each, and the rotors.
+
+    The file's own motors, sensors and limits are not there: the machine model has its own. Raises
+    CannotRun for an effect that hangs bodies on a joint.
+    """
+    name = model.mjcf_name or ""
+    spec = read_bodies(model.mjcf or "", name)
+    for part in (*spec.actuators, *spec.sensors, *spec.keys):
+        spec.delete(part)
+    spec.option.timestep = model.period
+    for part in strip_passive(spec, model.joints.values()):
+        part.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    for tie in spec.equalities:
+        tie.solref[:] = 2.0 * model.period, 1.0  # as stiff as can be: its give is not identified
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    for axis, own in model.axes.items():
+        for f in own.effects:
+            if f.effect.attach is not None and f.effect.is_present(f.values):
+                raise CannotRun(
+                    f"axis {axis}: {f.effect.name} hangs bodies on a joint of {name}, which is not "
+                    "simulated; put the body and its spring into that file"
+                )
+        part = spec.joint(own.joint) or spec.tendon(own.joint)
+        part.armature = own.weighed.mass - own.mass
+        add_motor(spec, axis, own.joint or axis)
+    return spec
+
+
+def driven(model: MachineModel) -> list[Driven]:
+    """The axes of such a spec.
+
+    Friction stops a joint by the least inertia that it may have: more than it has would throw it
+    back and forth, less stops it a little later.
+    """
+    found = mechanism_in(model)
+    return [
+        Driven(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
+        for (name, axis), least in zip(model.axes.items(), found.freed, strict=True)
+    ]

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from axis_runs import effect
 
-from twin.core.loop import (
+from twin.experiments.trajectory import Setpoint
+from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.signals import Array
+from twin.simulation.loop import (
     COMMAND_COLUMN,
     POSITION_COLUMN,
     READING_COLUMN,
     VELOCITY_COLUMN,
     Controller,
 )
-from twin.experiments.trajectory import Setpoint
-from twin.model.machine import AxisModel, Hardware, MachineModel
-from twin.signals import Array
-from twin.simulator import FineSimulator, MujocoSimulator, ReducedSimulator, run
+from twin.simulation.simulators import FineSimulator, MujocoSimulator, ReducedSimulator, run
 
 H = 5e-4  # s
 LOOP = Controller(proportional=310.0, integral=2900.0, derivative=21.0, filter_bandwidth=83.0,
@@ -29,7 +29,7 @@ LOOP = Controller(proportional=310.0, integral=2900.0, derivative=21.0, filter_b
 
 
 class Pid:
-    """The controller of one axis, from the docstring of twin.core.loop.Controller."""
+    """The controller of one axis, from the docstring of twin.simulation.loop.Controller."""
 
     def __init__(self, c: Controller, limit: float, dt: float) -> None:
         self.c, self.limit, self.dt = c, limit, dt
