@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,20 +24,6 @@ from twin.model.units import LINEAR, ROTARY, AxisUnits
 
 if TYPE_CHECKING:
     from twin.mujoco.mechanism import Joint
-
-# Of a linear axis, and what the entry is where that helps.
-HARDWARE_UNITS = {
-    "travel": "m",
-    "force_constant": "N/A",
-    "force_limit": "N",
-    "encoder_resolution": "m",
-    "encoder_noise": "m rms",
-    "current_noise": "A rms",
-    "velocity": "m/s, fastest move",
-    "acceleration": "m/s^2, fastest move",
-    "jerk": "m/s^3, fastest move",
-    "bandwidth": "Hz, position loop",
-}
 
 
 def models_folder() -> Path:
@@ -173,7 +159,7 @@ def _axis(
         unknown = set(entry.fixed or ()) - {units.mass_name}
         if unknown:
             raise InputError(f"fixed = {entry.fixed}: give ['{units.mass_name}'], or leave it out")
-        given = {f.name: getattr(entry, f.name) for f in fields(Hardware)}
+        given = {key: getattr(entry, key) for key in Hardware.entries()}
         return AxisModel(
             mass=bodies[name].inertia if name in bodies else float(getattr(entry, units.mass_name)),
             hardware=Hardware(**{key: v for key, v in given.items() if v is not None}),
@@ -246,12 +232,11 @@ def _axis_table(axis: AxisModel) -> tomlkit.items.Table:
         table[mass.name] = tomlkit.item(axis.mass).comment(f"{units(mass.unit)}, {mass.meaning}")
         if axis.mass_fixed:
             table["fixed"] = [mass.name]
-    for key, known in HARDWARE_UNITS.items():
+    for key, known in Hardware.entries().items():
         value = getattr(axis.hardware, key)
         if value is not None:
-            unit, comma, meaning = known.partition(",")
-            item = tomlkit.item(list(value) if key == "travel" else value)
-            table[key] = item.comment(f"{units(unit)}{comma}{meaning}")
+            item = tomlkit.item(list(value) if isinstance(value, tuple) else value)
+            table[key] = item.comment(f"{units(known.unit)}{known.note}")
     if axis.test_function is not None:
         length = tomlkit.item(axis.test_function)
         table["test_function"] = length.comment("s, over which a fit averages forces")
@@ -289,7 +274,7 @@ def save_model(model: MachineModel, path: str | Path) -> None:
 
 def storable(hardware: Hardware) -> Hardware:
     """The hardware less what no model's file may hold, which has its default."""
-    given = {f.name: getattr(hardware, f.name) for f in fields(Hardware)}
+    given = {key: getattr(hardware, key) for key in Hardware.entries()}
     try:
         AxisEntry.model_validate({name: v for name, v in given.items() if v is not None})
     except ValidationError as errors:

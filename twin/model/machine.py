@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
+from typing import Any
 
 from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
@@ -63,29 +64,51 @@ MOST_AXES_OF_A_PAIR = 2  # with more, which is the other axis?
 
 
 @dataclass(frozen=True)
-class Hardware:
-    """What surrounds an axis' mechanics, in the units of a linear axis (see twin.model.units)."""
+class HardwareEntry:
+    """What a machine's file may hold of one field of the hardware, and how it is shown there."""
 
-    travel: tuple[float, float] | None = None
-    """Low and high end of the travel, m; None where it is not known."""
-    force_constant: float = 1.0
-    """Force of the drive per current, N/A."""
-    force_limit: float = math.inf
-    """Most force of the drive, N."""
-    encoder_resolution: float = 0.0
-    """Step of the readings, m."""
-    encoder_noise: float = 0.0
-    """Noise of the readings, m RMS."""
-    current_noise: float = 0.0
-    """Noise of the measured current, A RMS."""
-    velocity: float = 0.25
-    """Fastest move, m/s."""
-    acceleration: float = 2.0
-    """Strongest acceleration of a move, m/s^2."""
-    jerk: float = 200.0
-    """Highest jerk of a move, m/s^3."""
-    bandwidth: float = 30.0
-    """Bandwidth of the position loop, Hz."""
+    unit: str
+    """On a linear axis."""
+    meaning: str
+    note: str = ""
+    """What stands behind the unit in a file."""
+    zero: bool = False
+    """Whether 0 is allowed."""
+    most: float = 1e12
+    """The largest value that is."""
+
+
+def _of_hardware(default: Any, *args: Any, **kwargs: Any) -> Any:
+    """A field of the hardware with its ``HardwareEntry``."""
+    return field(default=default, metadata={"entry": HardwareEntry(*args, **kwargs)})
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """What surrounds an axis' mechanics, in the units of a linear axis (see twin.model.units).
+
+    A field is declared here alone: files, their schema and their comments follow.
+    """
+
+    travel: tuple[float, float] | None = _of_hardware(None, "m", "low and high end")
+    force_constant: float = _of_hardware(1.0, "N/A", "force of the drive per current")
+    force_limit: float = _of_hardware(math.inf, "N", "most force of the drive", most=math.inf)
+    encoder_resolution: float = _of_hardware(0.0, "m", "step of the readings", zero=True, most=1.0)
+    encoder_noise: float = _of_hardware(
+        0.0, "m", "rms of the readings' noise", " rms", zero=True, most=1.0
+    )
+    current_noise: float = _of_hardware(
+        0.0, "A", "rms of the current's noise", " rms", zero=True, most=1e3
+    )
+    velocity: float = _of_hardware(0.25, "m/s", "fastest move", ", fastest move", most=1e6)
+    acceleration: float = _of_hardware(2.0, "m/s^2", "fastest move", ", fastest move")
+    jerk: float = _of_hardware(200.0, "m/s^3", "fastest move", ", fastest move")
+    bandwidth: float = _of_hardware(30.0, "Hz", "of the position loop", ", position loop", most=1e6)
+
+    @classmethod
+    def entries(cls) -> dict[str, HardwareEntry]:
+        """Of each field, by its name."""
+        return {f.name: f.metadata["entry"] for f in fields(cls)}
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, create_model
 
 from twin.effect import LEAST, MOST, Effect
 from twin.entries import Entries
-from twin.model.machine import HistoryStep
+from twin.model.machine import Hardware, HistoryStep
 from twin.model.units import ROTARY
 
 AXIS_NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
@@ -29,6 +29,7 @@ def _quantity(unit: str, meaning: str, *, zero: bool = False, most: float = 1e12
     if most != float("inf"):
         bounds["le"] = most
         least += f" to {most:g}" if zero else f", at most {most:g}"
+    bounds["allow_inf_nan"] = most == float("inf")
     return Field(None, **bounds, description=f"{least}, in {units}: {meaning}")
 
 
@@ -53,7 +54,25 @@ def _ordered(travel: tuple[float, float]) -> tuple[float, float]:
     return travel
 
 
+Travel = Annotated[tuple[Place, Place], AfterValidator(_ordered)]
 Moved = Annotated[float, AfterValidator(_imposed_or_heavy)]
+
+
+def _with_hardware(kind: type[Entries]) -> type[Entries]:
+    """The same entries, and those of the hardware: numbers, and of the travel a pair."""
+    given: dict[str, Any] = {
+        name: (float | None, _quantity(e.unit, e.meaning, zero=e.zero, most=e.most))
+        for name, e in Hardware.entries().items()
+    }
+    given["travel"] = (
+        Travel | None,
+        Field(
+            None,
+            strict=False,
+            description="two numbers, the low one first, in m (rad on a rotary axis)",
+        ),
+    )
+    return create_model(kind.__name__, __base__=kind, __module__=__name__, **given)
 
 
 class EffectEntry(Entries):
@@ -66,8 +85,9 @@ class EffectEntry(Entries):
     )
 
 
-class AxisEntry(Entries):
-    """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
+@_with_hardware
+class _MovedEntry(Entries):
+    """What an axis moves, and its hardware."""
 
     mass: Moved | None = _moved("kg", "moved mass", "force")
     inertia: Moved | None = _moved("kg m^2", "moment of inertia", "torque")
@@ -79,22 +99,11 @@ class AxisEntry(Entries):
     fixed: list[Name] | None = Field(
         None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'
     )
-    travel: Annotated[tuple[Place, Place], AfterValidator(_ordered)] | None = Field(
-        None, strict=False,
-        description="two numbers, the low one first, in m (rad on a rotary axis)",
-    )  # fmt: skip
-    force_constant: float | None = _quantity("N/A", "force of the drive per current")
-    force_limit: float | None = Field(
-        None, gt=0.0, allow_inf_nan=True,
-        description="a number above 0, in N (N m on a rotary axis): most force of the drive",
-    )  # fmt: skip
-    encoder_resolution: float | None = _quantity("m", "step of the readings", zero=True, most=1.0)
-    encoder_noise: float | None = _quantity("m", "rms of the readings' noise", zero=True, most=1.0)
-    current_noise: float | None = _quantity("A", "rms of the current's noise", zero=True, most=1e3)
-    velocity: float | None = _quantity("m/s", "fastest move", most=1e6)
-    acceleration: float | None = _quantity("m/s^2", "fastest move")
-    jerk: float | None = _quantity("m/s^3", "fastest move")
-    bandwidth: float | None = _quantity("Hz", "of the position loop", most=1e6)
+
+
+class AxisEntry(_MovedEntry):
+    """One axis, with ``mass`` or with ``inertia``; what is left out has the default of Hardware."""
+
     test_function: float | None = _quantity(
         "s", "over which a fit averages forces; where left out, chosen from the logs", most=1e3
     )
