@@ -5,19 +5,24 @@ from __future__ import annotations
 import json
 import os
 import platform
+import subprocess
+import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import date
 from importlib.metadata import version
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).parent.parent
 PACKAGES = ("mujoco", "numba", "numpy", "scipy", "mcap")
 PREAMBLE = """\
 # Benchmarks
 
 Written by `python -m benchmarks` (`make bench`). Ratios are of runs in turn (A B A B) on one
-machine, median of the rounds; figures in seconds or nanoseconds hold for that machine alone.
+machine, median of the rounds; figures in seconds or nanoseconds hold for that machine alone. Under
+each title stands what was measured: version, commit, date and machine.
 """
 
 
@@ -63,8 +68,40 @@ class Figure:
         return {None: "", True: "pass", False: "FAIL"}[self.passed]
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Of what a table was measured, and on what machine; date: of the day, ISO 8601."""
+
+    version: str
+    commit: str
+    date: str
+    machine: str
+
+    @classmethod
+    def now(cls) -> Origin:
+        """That of a table which is measured here."""
+        commit = ["git", "describe", "--always", "--exclude=*", "--dirty=, changed"]
+        done = subprocess.run(commit, cwd=ROOT, capture_output=True, text=True)
+        return cls(this_version(), done.stdout.strip(), date.today().isoformat(), machine())
+
+    @property
+    def minor(self) -> tuple[int, int]:
+        """Major and minor version."""
+        major, minor = map(int, self.version.split(".")[:2])
+        return major, minor
+
+    def __str__(self) -> str:
+        return f"Version {self.version}, commit {self.commit}, {self.date}; {self.machine}"
+
+
+def this_version() -> str:
+    """The version in pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return str(project["version"])
+
+
 def machine() -> str:
-    """The machine that the figures were measured on."""
+    """The machine that the figures are measured on."""
     versions = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     return f"{os.cpu_count()} CPUs, Python {platform.python_version()}, {versions}"
 
@@ -72,15 +109,18 @@ def machine() -> str:
 def write_results(results: Mapping[str, Sequence[Figure]], folder: Path) -> None:
     """Bring RESULTS.md and RESULTS.json in the folder up to date, whole or not at all.
 
-    Benchmarks that were not run keep the figures they had.
+    Benchmarks that were not run keep the figures they had, and of what these were measured.
     """
-    kept = _kept(folder / "RESULTS.json")
-    fresh = {title: [_as_json(f) for f in figures] for title, figures in results.items()}
-    benchmarks = {**kept, **fresh}
-    sections = "\n".join(f"## {title}\n\n{_table(rows)}" for title, rows in benchmarks.items())
-    _replace(folder / "RESULTS.md", f"{PREAMBLE}\n{machine()}\n\n{sections}")
-    content = {"machine": machine(), "benchmarks": benchmarks}
-    _replace(folder / "RESULTS.json", json.dumps(content, indent=1) + "\n")
+    origin = asdict(Origin.now())
+    tables = kept_tables(folder)
+    for title, figures in results.items():
+        tables[title] = {"origin": origin, "figures": [_as_json(f) for f in figures]}
+    sections = "\n".join(
+        f"## {title}\n\n{Origin(**table['origin'])}\n\n{_table(table['figures'])}"
+        for title, table in tables.items()
+    )
+    _replace(folder / "RESULTS.md", f"{PREAMBLE}\n{sections}")
+    _replace(folder / "RESULTS.json", json.dumps(tables, indent=1) + "\n")
 
 
 def shown(value: float | None) -> str:
@@ -98,8 +138,10 @@ def report(figures: Sequence[Figure]) -> int:
     return int(any(f.passed is False for f in figures))
 
 
-def _kept(path: Path) -> dict[str, list[dict[str, Any]]]:
-    return json.loads(path.read_text(encoding="utf-8"))["benchmarks"] if path.is_file() else {}
+def kept_tables(folder: Path) -> dict[str, dict[str, Any]]:
+    """The tables of RESULTS.json by title: ``origin`` and ``figures``."""
+    path = folder / "RESULTS.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
 
 def _table(figures: Sequence[Mapping[str, Any]]) -> str:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.figures import Figure, Target, write_results
+from benchmarks import figures
+from benchmarks.figures import Figure, Origin, Target, kept_tables, write_results
 from benchmarks.size import Code, at
 from benchmarks.stages import STAGES
 from twin.errors import InputError
+
+RESULTS = Path(figures.__file__).parent
 
 
 @pytest.mark.parametrize(
@@ -30,6 +34,27 @@ def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
     assert [Figure("w", v, target=target).verdict for v in (met[0], missed[0])] == ["pass", "FAIL"]
 
 
+# Tables of earlier versions, as RESULTS.md says of each, until `make bench` measures them again.
+OLDER = {
+    "Simulation", "Start of a process", "Fits against mujoco.sysid", "MCAP logs",
+    "Cost of one effect and sample (CPU time of its compiled law)", "Diagnosis", "Self-test",
+    "Commands in passes", "EMPS", "The thesis reproduced", "Fuzz",
+    "Stages of a diagnosis in passes, and the effects that it tries",
+    "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes",
+    "Second simulator", "Real machines with a term withheld from their model",
+    "A model as feedforward",
+    "Frequency response of two masses on a spring, 1 kHz, 16 s, over 100 draws",
+}  # fmt: skip
+
+
+def test_a_table_is_of_this_minor_version_unless_it_is_known_to_be_older():
+    now = Origin.now().minor
+    tables = {title: Origin(**t["origin"]) for title, t in kept_tables(RESULTS).items()}
+    assert {title.split(":")[0] for title, o in tables.items() if o.minor < now} == OLDER
+    text = (RESULTS / "RESULTS.md").read_text(encoding="utf-8")
+    assert all(f"## {title}\n\n{origin}\n" in text for title, origin in tables.items())
+
+
 def test_figures_without_value_or_target_have_no_verdict():
     assert (Figure("w", None, target=Target()).passed, Figure("w", 1.0).passed) == (None, None)
     assert (Figure("w", None).verdict, Figure("w", 1.0).verdict) == ("skipped", "")
@@ -46,7 +71,9 @@ def test_results_are_kept_for_what_was_not_run(tmp_path):
     old = [Figure("speed", 12.345, "ns", Target(high=20.0), "a note"), Figure("rate", None)]
     write_results({"first": old, "second": [Figure("x", 1.0)]}, tmp_path)
     write_results({"second": [Figure("y", np.float64(3.0), "s", Target(low=4.0))]}, tmp_path)
-    found = strict(tmp_path / "RESULTS.json")["benchmarks"]
+    tables = strict(tmp_path / "RESULTS.json")
+    assert all(t["origin"]["commit"] and t["origin"]["date"] for t in tables.values())
+    found = {title: t["figures"] for title, t in tables.items()}
     assert found["first"] == [
         {"figure": "speed", "value": 12.345, "unit": "ns", "target": "at most 20", "passed": True,
          "note": "a note"},
@@ -64,7 +91,7 @@ def test_results_are_kept_for_what_was_not_run(tmp_path):
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_a_figure_that_is_no_number_is_null_in_the_file(tmp_path, value):
     write_results({"first": [Figure("speed", value, target=Target(low=0.0))]}, tmp_path)
-    (row,) = strict(tmp_path / "RESULTS.json")["benchmarks"]["first"]
+    (row,) = strict(tmp_path / "RESULTS.json")["first"]["figures"]
     assert row["value"] is None
 
 
