@@ -151,7 +151,7 @@ def correct_body(
     if not model.joints:
         raise InputError(
             f"{model.name}: link_mass corrects a body of a MuJoCo file, and its axes are no joints "
-            "of one; add payload_mass, or begin with `twin new LOG --mjcf robot.xml`"
+            "of one; add payload_mass, or make the first model of an MJCF file (`twin new`)"
         )
     before = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress

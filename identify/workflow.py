@@ -375,19 +375,22 @@ def on_machine(
     """The frequency response that logs show and the model makes, and what its feedforward gains.
 
     before: the model without what was found, if anything was. What the logs do not tell, and what
-    the machine cannot run, is None.
+    the machine cannot run, is left out, with the reason.
     """
     given = logs_by_name(logs)
-    response = partial(frequency_response, given, model, progress=progress)
-    worth = partial(feedforward, model, given, before, progress=progress)
-    return OnMachine(_or_none(response), None if before is None else _or_none(worth))
-
-
-def _or_none(job: Callable[[], Any]) -> Any:
-    try:
-        return job()
-    except InputError:
-        return None
+    jobs: dict[str, Callable[[], Any]] = {
+        "response": partial(frequency_response, given, model, progress=progress)
+    }
+    if before is not None:
+        jobs["worth"] = partial(feedforward, model, given, before, progress=progress)
+    known: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+    for name, job in jobs.items():
+        try:
+            known[name] = job()
+        except InputError as why:
+            left_out[name] = str(why)
+    return OnMachine(**known, left_out=left_out)
 
 
 @parallel()

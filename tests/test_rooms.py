@@ -32,6 +32,7 @@ MOST_FLOORS = 11  # the table of rules is the lowest: what is decided in a datas
 # Functions that tell what a model or a result holds, without its logs.
 READING = {"followed", "nonparametric_labels"}
 ONE_OF_EACH = re.compile(r"np\.gradient|savgol|0\.6745|np\.diff\([^)]*\) / ")
+OPTION = re.compile(r"(?<!-)--[a-z]")
 UNIT_SELECTORS = re.compile(r"""\bunit\s*(==|!=|in|not in)\s*[(\[{]?["'](?!1["'])""")
 
 
@@ -183,6 +184,17 @@ def test_no_other_file_of_the_product_names_an_effect(effect: str) -> None:
     """Adding or removing one file is all it takes."""
     naming = {path for path, words in words_of_the_product().items() if effect in words}
     assert naming <= {TWIN / "effects" / f"{effect}.py"}
+
+
+def test_an_error_names_no_option_of_the_command_line() -> None:
+    """It is read by users of Python, too, whose arguments are called otherwise."""
+    rooms = {*ROOMS[: ROOMS.index("output")], "workflow", "adding", *TWIN_ROOMS} - {"examples"}
+    for name, path in (modules(IDENTIFY) | modules(TWIN)).items():
+        if room(name) in rooms:
+            told = {n.value for n in ast.walk(parsed(path)) if isinstance(n, ast.Expr)}
+            texts = [n for n in ast.walk(parsed(path)) if isinstance(n, ast.Constant)]
+            said = [str(n.value) for n in texts if n not in told]
+            assert not [s for s in said if OPTION.search(s)], path
 
 
 @cache

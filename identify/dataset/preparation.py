@@ -38,7 +38,7 @@ from twin.telling import tell
 from twin.threads import trim_memory
 
 TURN = 2.0 * np.pi  # rad
-LONGER = "give a log in which it moves for longer at a time, or a shorter --test-function (s)"
+LONGER = "give a log in which it moves for longer at a time, or shorter test functions (s)"
 
 
 def datasets(

@@ -93,7 +93,7 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
     if not np.isfinite(costs).any():
         raise InputError(
             f"axis {logs[0].motion.axis}: the motion that the model makes of the command alone is "
-            "not finite; fit the force residual first (--objective force)"
+            "not finite; fit the force residual first"
         )
     found = problem.settled(tried[int(np.nanargmin(costs))].x)
     if problem.is_rough(found.x):
@@ -281,7 +281,7 @@ def _require_alone(axis: AxisModel, logs: Sequence[PreparedLog]) -> None:
         if any(f.effect.reads(signal) for signal in OF_OTHER_AXIS):
             raise InputError(
                 f"axis {logs[0].motion.axis}: '{f.effect.name}' depends on the other axis, whose "
-                "motion a simulation of this axis alone does not hold; use --objective force"
+                "motion a simulation of this axis alone does not hold; fit the force residual"
             )
 
 

@@ -90,7 +90,7 @@ def proposals(
             found.append(experiment)
     if not found:
         raise CannotRun(
-            f"no experiment of {duration:g} s fits axis {axis}; give a longer --duration (s)"
+            f"no experiment of {duration:g} s fits axis {axis}; give a longer duration (s)"
         )
     return found, tuple(not_run)
 
@@ -101,7 +101,7 @@ def _require_fit(experiment: Experiment, model: MachineModel, duration: float) -
     if setpoint.duration > (1.0 + ALLOWED) * duration:
         raise CannotRun(
             f"takes {setpoint.duration:.3g} s, more than the {duration:g} s planned; give a longer "
-            "--duration (s)"
+            "duration (s)"
         )
 
 

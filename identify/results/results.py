@@ -139,10 +139,12 @@ class OnMachine:
     """What a model says of the loop of its machine; None where the logs do not tell it.
 
     response: of position to force, measured and modelled. worth: of the model's feedforward.
+    left_out: by the name of one of these, why it is not told.
     """
 
     response: FrequencyResponse | None = None
     worth: Feedforward | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 UNTOLD = OnMachine()

@@ -63,7 +63,7 @@ class Catalogue(Mapping[str, Effect]):
     def _unknown(self, name: str) -> str:
         return (
             f"unknown effect '{name}'; {near(name, self._effects)}`twin effects` lists the "
-            f"{len(self)} that exist; --effects FILE adds your own"
+            f"{len(self)} that exist, to which a file of your own can be added"
         )
 
 

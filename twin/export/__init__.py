@@ -119,7 +119,7 @@ def find_exporter(name: str) -> Exporter:
     known = format_names()
     if name not in known:
         raise InputError(
-            f"--to {name}: no such format; {near(name, known)}there are {', '.join(known)}"
+            f"'{name}' is no format of an export; {near(name, known)}there are {', '.join(known)}"
         )
     found: Exporter = importlib.import_module(f"{__name__}.formats.{name}").EXPORTER
     return found

@@ -279,7 +279,8 @@ class _Salvage:
         """The longest stretch of the file called so and the others; raises InputError for none."""
         stretches = self._stretches(self._by_topic())
         if not stretches:
-            hint = "; read it with --unproved" * bool(self._unproved and not self._keep_unproved)
+            unread = self._unproved and not self._keep_unproved
+            hint = "; keep what no checksum proves as well (unproved)" * bool(unread)
             why = "; ".join(dict.fromkeys([*self._lost, *self._unproved]))
             raise InputError(f"nothing can be recovered ({why}){hint}")
         # the rate is stated in every chunk too, and there a checksum protects it

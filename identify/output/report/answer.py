@@ -129,8 +129,12 @@ def _compared(view: AxisView) -> AnswerBlock:
     )
 
 
+# The parts of what a model says of its machine.
+OF_MACHINE = {"response": "the frequency response", "worth": "what the model gains as feedforward"}
+
+
 def notes(subject: Subject) -> list[Block]:
-    """Notes of all axes, of the model's history and of the check of the logs, each once."""
+    """Notes of all axes, of the history, of the check, and of what is left out, each once."""
     said = [
         f"Axis {view.name}: {note}"
         for view in subject.views
@@ -140,5 +144,7 @@ def notes(subject: Subject) -> list[Block]:
         how = "given the shape found" if step.action == "shape" else "added"
         said += [f"Axis {step.axis}, {spaced(step.effect)} {how}: {note}" for note in step.notes]
     said += minor(subject.findings)
+    for part, why in subject.machine.left_out.items():
+        said.append(f"Left out is {OF_MACHINE[part]}: {why}")
     once = tuple(dict.fromkeys(f"{note.removesuffix('.')}." for note in said))
     return [Listing(once)] if once else []

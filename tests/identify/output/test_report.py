@@ -90,6 +90,20 @@ def test_what_feedforward_gains_is_known_where_something_was_found(case: Case) -
     assert on_machine(after, case.held).worth is None  # nothing was found: nothing is gained
 
 
+def test_what_the_logs_do_not_tell_is_left_out_of_a_page_with_the_reason(
+    case: Case, tmp_path: Path
+) -> None:
+    """Logs without a setpoint tell no response."""
+    free = {}
+    for name, log in case.fit.items():
+        x = log.axes["x"]
+        columns = {k: v for k, v in x.columns.items() if not k.startswith("setpoint")}
+        free[name] = replace(log, axes={"x": replace(x, columns=columns)})
+    known = on_machine(case.diagnosis.model, free)
+    text = Outline(case.write(tmp_path / "r.html", machine=known)).text
+    assert "Left out is the frequency response: axis x: the log has no setpoint_position" in text
+
+
 def test_the_response_of_the_page_is_that_of_the_command_and_says_of_which_logs(
     case: Case, tmp_path: Path
 ) -> None:
