@@ -12,7 +12,7 @@ thresholds (``RULE``):
 * t: the logarithmic gain over blocks over its standard error; on the training logs less what as
   many parameters take of noise. Each group of logs has to show it by itself, and the more changes
   were tried, the more is asked of both together (Bonferroni, Stouffer).
-* control: the part that the same change takes where it is true to nothing (``controls``).
+* control: the part that the same change takes by chance, after a shift in time (``controls``).
 """
 
 from __future__ import annotations

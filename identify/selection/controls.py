@@ -1,4 +1,4 @@
-"""Controls of a change: what it would take of an error if it were true to nothing.
+"""Controls of a change: what it takes of an error by chance.
 
 Where something else remains above the noise floor, noise is no yardstick: smooth columns take part
 of any smooth remainder. A control has the change's own columns, shifted in time within each log by

@@ -359,7 +359,7 @@ class _Salvage:
 
     @contextmanager
     def _losing(self) -> Iterator[None]:
-        """What is wrong is a loss, and no more."""
+        """A fault within is noted as a loss of this file, and raised no further."""
         try:
             yield
         except InputError as error:

@@ -167,7 +167,7 @@ MANY = axis_of(*(fitted(n) for n in ("cogging", "roller_spikes", "spring", "quad
 
 
 def fitted_to_noise(seed: int) -> Score:
-    """The score of as many columns as the added effects have, all true to nothing."""
+    """The score of as many columns of noise as the added effects have."""
     rng = np.random.default_rng(seed)
     few = len(free_parameters(axis_of()))
     columns = rng.standard_normal((200, len(free_parameters(MANY))))
