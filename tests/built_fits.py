@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset, Role
-from identify.dataset.motion import Blocks, Motion
+from identify.dataset.motion import Motion
 from identify.dataset.noise_floor import NoiseFloor
 from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import Evidence, Gain

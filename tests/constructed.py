@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Blocks, Motion, motion_of
+from identify.dataset.motion import Motion, motion_of
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.fit import Fit, finished
 from identify.estimation.fit import Outcome as Ended

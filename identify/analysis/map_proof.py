@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identify.analysis.first_model import FirstValues, values_of
+from identify.analysis.first_model import values_of
+from identify.analysis.first_values import FirstValues
 from twin.importers.proposal.doubts import motion_of_force
 from twin.importers.proposal.motion import Explained
 from twin.logs import Log

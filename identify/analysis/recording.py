@@ -18,7 +18,7 @@ from math import pi
 
 import numpy as np
 
-from identify.analysis.first_model import LENGTHS
+from identify.analysis.first_values import LENGTHS
 from identify.dataset.bodies import bodies_along
 from identify.dataset.motion import motion_of
 from identify.dataset.test_function import TestFunction

@@ -13,7 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.motion import SMOOTHED, Blocks, Motion
+from identify.dataset.blocks import Blocks
+from identify.dataset.motion import SMOOTHED, Motion
 from twin.core.walks import walk, walk_sensing
 from twin.effect import Kind
 from twin.model.machine import AxisModel, axis_table

@@ -16,9 +16,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import Valued, actual_force, parts_of, reading_error, true_motion
-from identify.dataset.motion import Blocks, Motion
+from identify.dataset.motion import Motion
 from identify.dataset.path import Slip
 from identify.dataset.prepared_log import (
     PreparedLog,
@@ -140,8 +141,7 @@ def _sharpened(means: Array, log: PreparedLog) -> Array:
         return np.stack([np.interp(log.motion.time, log.time, own) for own in each])
 
     out = on_blocks(means)
-    # Twice the load is made to have the means by test functions that it is of
-    for _ in range(2):  # the means smooth it
+    for _ in range(2):  # averaging smooths the force: add back what it removed
         out += on_blocks(means - log.test_function.mean(out))
     return out
 

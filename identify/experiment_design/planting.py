@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import reading_error
-from identify.dataset.motion import Blocks, Motion
+from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, total_force
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit

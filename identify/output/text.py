@@ -16,13 +16,7 @@ from identify.output.numbers import (
     number,
     quantity,
 )
-from identify.output.words.diagnosis import (
-    all_found,
-    named_in_words,
-    said_of,
-    tested_on,
-    why_not,
-)
+from identify.output.words.diagnosis import said_of, tested_on, why_not
 from identify.output.words.fit import (
     LOOPS,
     agreement_in_words,
@@ -54,6 +48,7 @@ from identify.output.words.next_step import (
     wrong_body_in_words,
 )
 from identify.output.words.recording import read_otherwise_in_words
+from identify.output.words.verdict import all_found, named_in_words
 from identify.results import figure_of, html_of, report_of, text_of
 from identify.results.results import (
     Addition,

@@ -22,10 +22,10 @@ from identify.output.words.diagnosis import (
     advice,
     model_change_in_words,
     not_named_in_words,
-    pairs_in_words,
     said_of,
     why_not,
 )
+from identify.output.words.findings import pairs_in_words
 from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
 from identify.results.results import Addition, AllAdded, CorrectedBody, Diagnosis
 from identify.selection.candidates import Candidate

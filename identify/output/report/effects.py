@@ -32,7 +32,8 @@ from identify.output.report.page import (
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import shape_in_words, tested_on, why_not
+from identify.output.words.diagnosis import tested_on, why_not
+from identify.output.words.findings import shape_in_words
 from identify.output.words.fit import (
     common_reason,
     estimate_in_words,

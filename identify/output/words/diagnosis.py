@@ -5,22 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome
-from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.estimation.offered import NotTried, RestsTooOften
-from identify.output.numbers import (
-    DisplayUnit,
-    capitalised,
-    change,
-    each_with_unit,
-    listed,
-    number,
-    percent,
-    quantity,
-    spaced,
+from identify.output.numbers import capitalised, change, listed
+from identify.output.words.findings import (
+    all_in_words,
+    finding_in_words,
+    left_in_words,
+    role_in_words,
+    shape_in_words,
 )
 from identify.output.words.fit import (
     OUTCOMES,
@@ -33,145 +26,16 @@ from identify.output.words.fit import (
     worst_in_words,
 )
 from identify.output.words.next_step import also_chose_in_words, fitted_curves, next_commands
+from identify.output.words.verdict import headline_in_words, verdict_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, Freed
 from identify.selection.changes import Change as ModelChange
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
-from identify.selection.findings import Confirmation, Finding, FindingKind
-from identify.selection.roles import RoleDependent
+from identify.selection.findings import Finding
 from twin.model.machine import Hindrance
-from twin.model.units import AxisUnits, units_of
-
-
-def finding_in_words(finding: Finding) -> tuple[str, ...]:
-    """Sentences, e.g. "cogging explains 93 % of the squared error above the noise floor: ..."."""
-    words = units_of(finding.unit).words
-    removes, control = (percent(max(p, 0.0)) for p in (finding.score.part, finding.score.control))
-    said = [
-        _explained(finding),
-        f"It removes {removes} of what the other effects leave above the noise floor, on the logs "
-        "that chose it; the same force shifted in time, which cannot be real, removes at most "
-        f"{control} (19 of 20 times)",
-    ]
-    if finding.kind is not FindingKind.WRONG_SHAPE and finding.parameters:
-        units, known = finding.parameter_units, finding.parameters.items()
-        values = ", ".join(f"{n} = {quantity(v, units.get(n, '1'))}" for n, v in known)
-        law = f", in {' '.join(finding.equation.split())}" if finding.equation else ""
-        said.append(f"Found: {values}{law}")
-    if finding.confidence is None:
-        said.append("No confidence is stated, as the test logs contradict it")
-    else:
-        right = f"{percent(finding.confidence)} of answers as well supported as this were right"
-        said.append(f"{right}, on machines whose missing effect is known")
-    return tuple(words(text) for text in said)
-
-
-def _explained(finding: Finding) -> str:
-    tested = finding.tested
-    error = "test error" if tested.on is Role.TEST else f"error on the {tested.on.value} logs"
-    before, after = each_with_unit(tested.before, tested.after, finding.unit)
-    what, without, with_it = finding.effect, "without it", "with it"
-    if finding.kind is FindingKind.RESEMBLES:
-        shape = "in another shape; that law"
-        if finding.bend:
-            shape = "with {} in place of {}; that law".format(*_exponents_in_words(finding.bend))
-        what = f"what is missing resembles {finding.effect}, {shape}"
-    if finding.kind is FindingKind.WRONG_SHAPE:
-        what = f"{finding.effect} has another shape: a free curve beside its law"
-        without, with_it = "with the law", "with the curve"
-        if finding.bend:
-            with_it, without = (f"with {value}" for value in _exponents_in_words(finding.bend))
-            what = f"{finding.effect} has another shape, which its law {with_it} has: that"
-    if finding.kind is FindingKind.WRONG_VALUE and finding.bend:
-        logs, file = _exponents_in_words(finding.bend)
-        what = f"of {finding.effect} the file says {file}, the logs {logs}: that"
-        with_it, without = "with the value of the logs", "with that of the file"
-    how = {
-        Confirmation.CONTRADICTED: "is contradicted by the test logs",
-        Confirmation.UNTESTED: "is not tested by the test logs, whose error hardly changes",
-    }.get(finding.state)
-    if how is None or tested.on is not Role.TEST:
-        share = percent(finding.explains)
-        how = f"explains {share} of the squared error above the noise floor"
-    return f"{what} {how}: {without} the {error} is {before}, {with_it} {after}"
-
-
-def _exponents_in_words(bend: FreeExponent) -> list[str]:
-    """What bends a law as it was found, and as it was held, e.g. "n = 3"."""
-    values = (f"{value:.3g} {bend.unit.removesuffix('1')}" for value in (bend.found, bend.held))
-    return [f"{bend.parameter} = {value.strip()}" for value in values]
-
-
-def all_in_words(found: AxisDiagnosis) -> list[str]:
-    """Of several findings: what they explain together, and which need each other."""
-    if len(found.findings) < 2:
-        return []
-    said = (
-        f"together they explain {percent(found.explained)} of the squared error above the noise "
-        "floor; each share above is lost when that effect alone is taken out and the others are "
-        "refitted"
-    )
-    return [said, *pairs_in_words(found)]
-
-
-def pairs_in_words(found: AxisDiagnosis) -> list[str]:
-    """Of named effects that need each other, that they do."""
-    names = [f.effect for f in found.findings]
-    return [
-        f"{first} and {second} are needed together, so the logs prove neither alone: the model "
-        "that --model writes has both"
-        for i, first in enumerate(names)
-        for second in found.findings[i].together
-        if second in names[i + 1 :]
-    ]
-
-
-def shape_in_words(effect: str, shape: FoundShape) -> str:
-    """Where a law surely differs most from the curve found, and what that does at standstill."""
-    words = units_of(shape.force_unit).words
-    sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
-    direction = max(sure, key=lambda name: np.nanmax(sure[name]))
-    if not shape.differs:
-        return words(
-            f"At no single {shape.over.value} does the curve for {effect} differ from its law by "
-            "more than its 90 % band."
-        )
-    curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
-    values = [float(v[at]) for v in (curve.assumed, curve.found, curve.band)]
-    scale = DisplayUnit.of(shape.force_unit, values)
-    assumed, found, band = (number(v / scale.size) for v in values)
-    place = quantity(float(shape.coordinate[at]), shape.unit)
-    within = "" if shape.period is None else " of its period"
-    rest = " The force is gone at standstill." if shape.lets_go else ""
-    return words(
-        f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
-        f"assumes {assumed}, the logs show {found} ± {band} {scale.unit}.{rest}"
-    )
-
-
-def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
-    """How much is left beside what was found, and whether something else is missing too.
-
-    floor: of the training logs, N RMS.
-    """
-    if not found.findings:
-        return []
-    one = found.findings[0]  # noise is part of what is left, and so never more
-    chosen, fitted = max(one.left, 1.0), max(found.final.error / floor, 1.0)
-    own = quantity(floor, one.unit)
-    said = f"What is left is {fitted:.2f} times the noise floor of {own} on the training logs"
-    if one.chosen.on is not Role.TRAINING:
-        other = quantity(one.chosen.after / one.left, one.unit)
-        said += f" and {chosen:.2f} times that of {other} on the {one.chosen.on.value} logs"
-    what = "something else is missing too"
-    if max(chosen, fitted) < RULE.at_floor:
-        what = "noise"
-    elif found.dataset.force_noise:
-        what = "nothing that was measured predicts it, and its origin is not known"
-    return [f"{said}: {what}."]
-
+from twin.model.units import AxisUnits
 
 # --- what to do next --------------------------------------------------------------------------
 
@@ -210,14 +74,6 @@ class Said:
     notes: tuple[str, ...]
 
 
-def role_in_words(law: RoleDependent) -> str:
-    """That a law is proved or not by which log chooses."""
-    other = f"it takes {percent(max(law.part, 0.0))} of what is left, t = {law.t:.1f}"
-    proved = "with the training and the selection logs exchanged it is"
-    says = f"{proved} not proved: {other}" if law.named else f"as they are not ({other}), {proved}"
-    return f"whether {law.effect} is proved depends on which log chooses: {says}"
-
-
 def said_of(result: Diagnosis, axis: str) -> Said:
     """The sentences about one axis of a diagnosis."""
     found, region = result.axes[axis], result.left_over.get(axis)
@@ -253,144 +109,6 @@ def said_of(result: Diagnosis, axis: str) -> Said:
 
 
 # --- the answer -------------------------------------------------------------------------------
-
-WORTH = 0.01  # of the squared test error, below which a finding is told behind the others
-VERDICTS = {
-    Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
-    Verdict.WRONG_SHAPE: (
-        "The model has the effect, but its law has another shape than the force of the machine."
-    ),
-    Verdict.UNEXPLAINED: (
-        "The error is above the noise floor, and no effect of the catalogue explains it."
-    ),
-}
-
-
-def verdict_in_words(found: AxisDiagnosis) -> str:
-    """The answer of a diagnosis, what the logs cannot separate, and what test logs contradict."""
-    said = [VERDICTS.get(found.verdict) or _proved(found)]
-    if found.verdict is Verdict.NOTHING_MISSING and not found.final.at_floor:
-        said = [
-            "The selection logs show nothing that is missing: there the force error is at its "
-            f"noise floor. That of the training logs is {found.final.ratio:.1f} times theirs: "
-            "noise of another size, or something that only they excite. Record a selection log "
-            "like them."
-        ]
-    elif found.verdict is Verdict.NOTHING_MISSING and found.dataset.force_noise:
-        times = found.final.error / found.final.noise.known
-        said = [
-            "Nothing that is missing shows. The force error is "
-            f"{times:.1f} times what is known to make noise: nothing that was measured predicts "
-            "what is left, and its origin is not known."
-        ]
-    if reshaped := _reshaped(found):
-        said.append(f"The law of {listed(reshaped)} has another shape too.")
-    said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
-    if against := [f.effect for f in found.contradicted]:
-        ask = "The training logs ask" if not found.dataset.selection else "The logs that chose ask"
-        more = " too" if found.findings else ""
-        said.append(
-            f"{ask} for {listed(against)}{more}, but the test logs contradict "
-            f"{'them' if against[1:] else 'it'}: their error rises, so the model is without."
-        )
-    return " ".join(said)
-
-
-def _proved(found: AxisDiagnosis) -> str:
-    several = len(found.named) > 1
-    lacks, them = ("several effects", "them") if several else ("an effect", "it")
-    proof = f"the training logs prove {them}, block by block; there is no selection log"
-    if found.dataset.selection:
-        proof = f"the training logs and the selection logs prove {them}"
-    if len(_other_values(found)) == len(found.named):
-        values = "Values of the machine's file are" if several else "A value of the file is"
-        return f"{values} not the machine's: {proof}."
-    return f"The model lacks {lacks}: {proof}."
-
-
-def _other_values(found: AxisDiagnosis) -> list[str]:
-    """The effects of which the file of the machine states another value than the logs show."""
-    return [f.effect for f in found.findings if f.kind is FindingKind.WRONG_VALUE]
-
-
-def _reshaped(found: AxisDiagnosis) -> list[str]:
-    """The effects whose law has another shape, beside those that are missing."""
-    reshaped = [f.effect for f in found.findings if f.kind is FindingKind.WRONG_SHAPE]
-    return reshaped if found.missing else []
-
-
-def _ties(found: AxisDiagnosis) -> str:
-    """E.g. "cogging from wear, or lugre from gms", each pair once."""
-    ties = {f.effect: f.tied for f in found.findings}
-    said: list[str] = []
-    for name, alike in ties.items():
-        if {*alike} - {other for other in said if name in ties[other]}:
-            said.append(name)
-    return ", or ".join(f"{name} from {' or '.join(tied_in_words(name, found))}" for name in said)
-
-
-def tied_in_words(name: str, found: AxisDiagnosis) -> list[str]:
-    """What the logs cannot tell from a finding; a law of the model is so by another shape."""
-    tied = next(f.tied for f in found.findings if f.effect == name)
-    given = found.base.axis.names
-    return [f"another shape of {other}" if other in given else other for other in tied]
-
-
-def headline_in_words(found: AxisDiagnosis) -> str:
-    """E.g. "cogging or quadratic drag, and lugre are missing"."""
-    match found.verdict:
-        case Verdict.MISSING_EFFECTS:
-            are = "are" if len(found.named) > 1 else "is"
-            what = "missing"
-            if len(_other_values(found)) == len(found.named):
-                what = "not as the file says"
-            answer = f"{named_in_words(found)} {are} {what}"
-            if reshaped := _reshaped(found):
-                answer += f", and {listed(reshaped)} has another shape"
-        case Verdict.WRONG_SHAPE:
-            answer = f"{found.findings[0].effect} has another shape"
-        case Verdict.UNEXPLAINED:
-            answer = "something outside the catalogue is missing"
-        case Verdict.NOTHING_MISSING:
-            answer = "nothing is missing"
-    against = ", ".join(f.effect for f in found.contradicted)
-    return spaced(f"{answer} (contradicted by the test logs: {against})" if against else answer)
-
-
-def named_in_words(found: AxisDiagnosis) -> str:
-    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is.
-
-    What explains next to nothing beside the others is told as such.
-    """
-    large = [f for f in found.missing if f.explains >= WORTH] or found.missing
-    said = _each_in_words(found, large)
-    if small := [f for f in found.missing if f not in large]:
-        said += f", and for less than {percent(WORTH)} of the squared error "
-        said += _each_in_words(found, small)
-    return said
-
-
-def _each_in_words(found: AxisDiagnosis, some: Sequence[Finding]) -> str:
-    """Some of the missing effects, each with those that explain as much."""
-    each = [
-        " or ".join((
-            f"something like {f.effect}" if f.kind is FindingKind.RESEMBLES else f.effect,
-            *tied_in_words(f.effect, found),
-        ))
-        for f in some
-    ]  # fmt: skip
-    return ", and ".join(each) if any(f.tied for f in some) or not each else listed(each)
-
-
-def all_found(found: AxisDiagnosis) -> str:
-    """A label for what was found: the effect where it is one; "" where nothing was."""
-    if found.final is found.base:
-        return ""
-    if len(found.findings) != 1:
-        return "all that was found"
-    (only,) = found.findings
-    reshaped = only.kind is FindingKind.WRONG_SHAPE
-    return spaced(f"another shape of {only.effect}" if reshaped else only.effect)
 
 
 def tested_on(found: AxisDiagnosis) -> str:

@@ -23,10 +23,11 @@ from constructed import (
 )
 
 from identify.analysis.first_model import first_model
+from identify.dataset.blocks import Blocks, Columns
 from identify.dataset.bodies import PIECE, bodies_along
 from identify.dataset.coordinates import excitation
 from identify.dataset.drive import actual_force, reading_error, true_motion
-from identify.dataset.motion import SMOOTHED, Blocks, Columns, Motion, motion_of
+from identify.dataset.motion import SMOOTHED, Motion, motion_of
 from identify.dataset.prepared_log import motor_gain
 from identify.dataset.test_function import TestFunction
 from identify.estimation.force_balance import averaged_force, residual, unbalanced

@@ -14,8 +14,9 @@ from scipy.signal import welch
 
 from benchmarks.second_simulator.machine import drawn, run
 from identify import workflow
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Blocks, motion_of
+from identify.dataset.motion import motion_of
 from identify.dataset.noise import noise_of, noises_of
 from identify.dataset.noise_floor import floor_of, noise_beside, rounding_in, white_noise_floor
 from identify.dataset.prepared_log import PreparedLog, moving, on_blocks, sticks, total_force

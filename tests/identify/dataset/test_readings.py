@@ -12,9 +12,10 @@ from constructed import SHORT, log_of, ridden, waves
 from machines import CATALOGUE, STAGE, tracked
 from scipy.signal import lfilter
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.coordinates import ripples
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Blocks, motion_of
+from identify.dataset.motion import motion_of
 from identify.dataset.noise import noise_of
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog

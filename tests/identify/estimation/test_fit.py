@@ -21,8 +21,9 @@ from constructed import effect, fit_of, held, log_of, moved, waves, windowed
 from machines import CATALOGUE
 from scipy.optimize import least_squares
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
-from identify.dataset.motion import Blocks, motion_of
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, moving
 from identify.estimation.fit import Fit, Outcome, at_bounds, error_on, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual

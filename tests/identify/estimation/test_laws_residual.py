@@ -22,7 +22,8 @@ from constructed import (
 )
 from machines import CATALOGUE
 
-from identify.dataset.motion import Blocks, motion_of
+from identify.dataset.blocks import Blocks
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, scale_of, sticks
 from identify.dataset.test_function import TestFunction
 from identify.estimation.force_balance import (

@@ -12,7 +12,7 @@ from constructed import SHORT, moved, windowed
 from machines import CATALOGUE, PROTON, one_axis
 
 from identify import diagnose, plan
-from identify.dataset.motion import Blocks
+from identify.dataset.blocks import Blocks
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving
 from identify.estimation.evidence import effective_samples, evidence
 from identify.estimation.fit import fit_axis

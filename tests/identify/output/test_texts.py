@@ -25,7 +25,7 @@ from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.text import text_of
-from identify.output.words.diagnosis import named_in_words
+from identify.output.words.verdict import named_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement

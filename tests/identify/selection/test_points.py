@@ -17,8 +17,9 @@ import identify
 from identify.estimation.found_shape import found_shape
 from identify.estimation.free_curves import shapes_of
 from identify.output.as_json import json_of
-from identify.output.words.diagnosis import finding_in_words, verdict_in_words
+from identify.output.words.findings import finding_in_words
 from identify.output.words.next_step import WRITE, next_commands
+from identify.output.words.verdict import verdict_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import Confirmation, FindingKind
 from identify.selection.trying import try_effect

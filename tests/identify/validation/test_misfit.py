@@ -10,8 +10,9 @@ from machines import CATALOGUE, STAGE, tracked
 from noisy_motion import MASS, PUSH, RATE, noisy
 from scipy.signal import lfilter
 
+from identify.dataset.blocks import Blocks
 from identify.dataset.coordinates import coordinates_of, gathered, since_reversal
-from identify.dataset.motion import Blocks, motion_of
+from identify.dataset.motion import motion_of
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.evidence import effective_samples, rms

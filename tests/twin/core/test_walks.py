@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from machines import CATALOGUE
 
-from identify.dataset.motion import Blocks, Motion
+from identify.dataset.blocks import Blocks
+from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force, total_forces
 from twin.core.native import Table, build_table
 from twin.core.walks import averaged_columns, reading_columns, walk, walk_sensing

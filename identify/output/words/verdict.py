@@ -1,0 +1,148 @@
+"""The answer of a diagnosis in a sentence, a headline and a label."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from identify.output.numbers import listed, percent, spaced
+from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from identify.selection.findings import Finding, FindingKind
+
+WORTH = 0.01  # of the squared test error, below which a finding is told behind the others
+
+VERDICTS = {
+    Verdict.NOTHING_MISSING: "Nothing is missing: the force error is at its noise floor.",
+    Verdict.WRONG_SHAPE: (
+        "The model has the effect, but its law has another shape than the force of the machine."
+    ),
+    Verdict.UNEXPLAINED: (
+        "The error is above the noise floor, and no effect of the catalogue explains it."
+    ),
+}
+
+
+def verdict_in_words(found: AxisDiagnosis) -> str:
+    """The answer of a diagnosis, what the logs cannot separate, and what test logs contradict."""
+    said = [VERDICTS.get(found.verdict) or _proved(found)]
+    if found.verdict is Verdict.NOTHING_MISSING and not found.final.at_floor:
+        said = [
+            "The selection logs show nothing that is missing: there the force error is at its "
+            f"noise floor. That of the training logs is {found.final.ratio:.1f} times theirs: "
+            "noise of another size, or something that only they excite. Record a selection log "
+            "like them."
+        ]
+    elif found.verdict is Verdict.NOTHING_MISSING and found.dataset.force_noise:
+        times = found.final.error / found.final.noise.known
+        said = [
+            "Nothing that is missing shows. The force error is "
+            f"{times:.1f} times what is known to make noise: nothing that was measured predicts "
+            "what is left, and its origin is not known."
+        ]
+    if reshaped := _reshaped(found):
+        said.append(f"The law of {listed(reshaped)} has another shape too.")
+    said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []
+    if against := [f.effect for f in found.contradicted]:
+        ask = "The training logs ask" if not found.dataset.selection else "The logs that chose ask"
+        more = " too" if found.findings else ""
+        said.append(
+            f"{ask} for {listed(against)}{more}, but the test logs contradict "
+            f"{'them' if against[1:] else 'it'}: their error rises, so the model is without."
+        )
+    return " ".join(said)
+
+
+def _proved(found: AxisDiagnosis) -> str:
+    several = len(found.named) > 1
+    lacks, them = ("several effects", "them") if several else ("an effect", "it")
+    proof = f"the training logs prove {them}, block by block; there is no selection log"
+    if found.dataset.selection:
+        proof = f"the training logs and the selection logs prove {them}"
+    if len(_other_values(found)) == len(found.named):
+        values = "Values of the machine's file are" if several else "A value of the file is"
+        return f"{values} not the machine's: {proof}."
+    return f"The model lacks {lacks}: {proof}."
+
+
+def _other_values(found: AxisDiagnosis) -> list[str]:
+    """The effects of which the file of the machine states another value than the logs show."""
+    return [f.effect for f in found.findings if f.kind is FindingKind.WRONG_VALUE]
+
+
+def _reshaped(found: AxisDiagnosis) -> list[str]:
+    """The effects whose law has another shape, beside those that are missing."""
+    reshaped = [f.effect for f in found.findings if f.kind is FindingKind.WRONG_SHAPE]
+    return reshaped if found.missing else []
+
+
+def _ties(found: AxisDiagnosis) -> str:
+    """E.g. "cogging from wear, or lugre from gms", each pair once."""
+    ties = {f.effect: f.tied for f in found.findings}
+    said: list[str] = []
+    for name, alike in ties.items():
+        if {*alike} - {other for other in said if name in ties[other]}:
+            said.append(name)
+    return ", or ".join(f"{name} from {' or '.join(tied_in_words(name, found))}" for name in said)
+
+
+def tied_in_words(name: str, found: AxisDiagnosis) -> list[str]:
+    """What the logs cannot tell from a finding; a law of the model is so by another shape."""
+    tied = next(f.tied for f in found.findings if f.effect == name)
+    given = found.base.axis.names
+    return [f"another shape of {other}" if other in given else other for other in tied]
+
+
+def headline_in_words(found: AxisDiagnosis) -> str:
+    """E.g. "cogging or quadratic drag, and lugre are missing"."""
+    match found.verdict:
+        case Verdict.MISSING_EFFECTS:
+            are = "are" if len(found.named) > 1 else "is"
+            what = "missing"
+            if len(_other_values(found)) == len(found.named):
+                what = "not as the file says"
+            answer = f"{named_in_words(found)} {are} {what}"
+            if reshaped := _reshaped(found):
+                answer += f", and {listed(reshaped)} has another shape"
+        case Verdict.WRONG_SHAPE:
+            answer = f"{found.findings[0].effect} has another shape"
+        case Verdict.UNEXPLAINED:
+            answer = "something outside the catalogue is missing"
+        case Verdict.NOTHING_MISSING:
+            answer = "nothing is missing"
+    against = ", ".join(f.effect for f in found.contradicted)
+    return spaced(f"{answer} (contradicted by the test logs: {against})" if against else answer)
+
+
+def named_in_words(found: AxisDiagnosis) -> str:
+    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is.
+
+    What explains next to nothing beside the others is told as such.
+    """
+    large = [f for f in found.missing if f.explains >= WORTH] or found.missing
+    said = _each_in_words(found, large)
+    if small := [f for f in found.missing if f not in large]:
+        said += f", and for less than {percent(WORTH)} of the squared error "
+        said += _each_in_words(found, small)
+    return said
+
+
+def _each_in_words(found: AxisDiagnosis, some: Sequence[Finding]) -> str:
+    """Some of the missing effects, each with those that explain as much."""
+    each = [
+        " or ".join((
+            f"something like {f.effect}" if f.kind is FindingKind.RESEMBLES else f.effect,
+            *tied_in_words(f.effect, found),
+        ))
+        for f in some
+    ]  # fmt: skip
+    return ", and ".join(each) if any(f.tied for f in some) or not each else listed(each)
+
+
+def all_found(found: AxisDiagnosis) -> str:
+    """A label for what was found: the effect where it is one; "" where nothing was."""
+    if found.final is found.base:
+        return ""
+    if len(found.findings) != 1:
+        return "all that was found"
+    (only,) = found.findings
+    reshaped = only.kind is FindingKind.WRONG_SHAPE
+    return spaced(f"another shape of {only.effect}" if reshaped else only.effect)
