@@ -50,6 +50,18 @@ class Pid:
         return min(max(asked, -self.limit), self.limit)
 
 
+@pytest.mark.parametrize("frequency", [3.0, 40.0, 230.0])
+def test_the_response_of_a_loop_is_what_it_makes_of_a_sine(frequency):
+    """Over whole periods, once the start has died away."""
+    samples = round(1.0 / H)
+    angle = 2.0 * math.pi * frequency * H * np.arange(2 * samples)
+    pid, wave = Pid(LOOP, math.inf, H), np.exp(-1j * angle[samples:])
+    force = [pid.force(0.0, 0.0, 0.0, 0.0, reading) for reading in np.sin(angle)]
+    gain = -np.sum(force[samples:] * wave) / np.sum(np.sin(angle[samples:]) * wave)
+    told = LOOP.response(np.array([frequency]), H)[0]
+    assert abs(gain - told) < 1e-3 * abs(told)
+
+
 @pytest.mark.parametrize(("bandwidth", "mass"), [(5.0, 17.0), (80.0, 0.3)])
 def test_a_loop_made_for_an_axis_crosses_over_near_its_bandwidth(bandwidth, mass):
     """Gain 1 within a fifth of the bandwidth, a phase margin above 40 degrees; the integral part
