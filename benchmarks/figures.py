@@ -80,9 +80,10 @@ class Origin:
     @classmethod
     def now(cls) -> Origin:
         """That of a table which is measured here."""
-        commit = ["git", "describe", "--always", "--exclude=*", "--dirty=, changed"]
-        done = subprocess.run(commit, cwd=ROOT, capture_output=True, text=True)
-        return cls(this_version(), done.stdout.strip(), date.today().isoformat(), machine())
+        asked = ["git", "describe", "--always", "--exclude=*", "--dirty=, changed"]
+        done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True)
+        commit = done.stdout.strip() or "not known"
+        return cls(this_version(), commit, date.today().isoformat(), machine())
 
     @property
     def minor(self) -> tuple[int, int]:

@@ -13,6 +13,7 @@ from twin.errors import InputError
 from twin.files import (
     PART,
     atomic_writer,
+    kept_beside,
     recording,
     remove_unfinished,
     require_writable,
@@ -134,3 +135,17 @@ def test_a_run_that_lives_keeps_its_part(tmp_path: Path) -> None:
         stream.write(b"one")
         write_atomically(tmp_path / "b.bin", b"two")
     assert (tmp_path / "a.bin").read_bytes() == b"one"
+
+
+def test_each_content_that_is_written_over_is_kept_under_a_name_of_its_own(tmp_path: Path) -> None:
+    path, kept = tmp_path / "m.toml", []
+    assert kept_beside(path, b"0") is None  # nothing is there yet
+    for number in range(4):
+        write_atomically(path, b"%d" % number)
+        assert kept_beside(path, b"%d" % number) is None  # it would not be another
+        kept.append(kept_beside(path, b"new"))
+    assert [p and p.name for p in kept] == ["m.toml~", "m.toml~2", "m.toml~3", "m.toml~4"]
+    assert [p and p.read_bytes() for p in kept] == [b"0", b"1", b"2", b"3"]
+    write_atomically(path, b"2")
+    assert kept_beside(path, b"new") == kept[2]
+    assert len(list(tmp_path.iterdir())) == 5

@@ -191,8 +191,6 @@ def and_more(count: int) -> str:
 def uneven_curvature(axis: Axis) -> NDArray[np.intp]:
     """Samples where the position jumps, if it does everywhere: by the clock, and by no wrap."""
     curved = axis.curved_at
-    if not len(curved) or axis.position_held:
-        return curved[:0]
     curved = curved[axis.jumps[curved - 1] < 0.5 * float(np.ptp(axis.log.position))]
     places = 1 + np.count_nonzero(np.diff(curved) > SHORT_GAP * axis.sample_rate)
     # a jump a second at least, and so many that it is not this and that, but the clock

@@ -318,7 +318,7 @@ class Run:
                 )
         if not names and any(topic.startswith("/measured/") for topic in topics):
             raise InputError(
-                "is a comparison for viewers, which `twin compare` wrote, not a log: its force is "
+                "is a comparison for viewers (of `twin compare`), not a log: its force is "
                 "averaged; give the log that was compared"
             )
         if not names:

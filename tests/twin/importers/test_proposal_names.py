@@ -51,6 +51,7 @@ v  rpm .       Vitesse [tr/min]
 v  mm/s .      vel_mm_s
 v  deg/s .     speed_dps
 f  Nm  .       torque_nm
+f  %   .       torque_pct
 p  nm  .       position_nm
 i  A   .       torque [A]
 p  rad .       velocity [rad]
