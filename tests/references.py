@@ -208,13 +208,18 @@ def learned_residual(p: Values, q: Columns) -> Results:
     place = (q.x - p["start"]) / p["length"]
     speed = np.clip(q.v / p["speed"], -1.0, 1.0)
     memory = followed(q, p["reach1"]), followed(q, p["reach2"])
+    cross = [
+        (i, j, a, b) for i in range(24) for j in range(4) for a in (0, 1) for b in (0, 1)
+        if (1 + i) * (1 + j) * (1 + a) * (1 + b) <= 24
+    ]  # fmt: skip
+    assert sum(name.startswith("c_") for name in p) == len(cross)
     force = np.zeros(len(q))
     for name, value in p.items():
         if name.startswith("c_"):
-            i, j, a, b = map(int, name.split("_")[1:])
-            assert (1 + i) * (1 + j) * (1 + a) * (1 + b) <= 24
-            term = np.cos(np.pi * i * np.clip(place, 0.0, 1.0)) * Chebyshev.basis(j)(speed)
-            force += value * term * memory[0] ** a * memory[1] ** b
+            i, j, a, b = term = tuple(map(int, name.split("_")[1:]))
+            assert term in cross
+            wave = np.cos(np.pi * i * np.clip(place, 0.0, 1.0)) * Chebyshev.basis(j)(speed)
+            force += value * wave * memory[0] ** a * memory[1] ** b
     edge = 1.0 / 24.0
     return {OUT: force * np.interp(place, [-edge, 0.0, 1.0, 1.0 + edge], [0.0, 1.0, 1.0, 0.0])}
 

@@ -86,6 +86,26 @@ def test_what_is_no_model_is_one_line(log) -> None:
             call(log, "proton_xy")
 
 
+def test_a_file_may_name_an_effect_of_the_catalogue_that_is_given(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("brake.py").write_text((Path(twin.__file__).parent / "effects/spring.py").read_text())
+    own = twin.load_catalogue([Path("brake.py")])
+    model = twin.load_model("proton_xy")
+    braked = model.axes["x"].with_effect(twin.Fitted.at_start(own["brake"]))
+    twin.save_model(model.with_axis("x", braked), "m.toml")
+    for call, given, said in (
+        (identify.fit, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
+        (identify.diagnose, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
+        (identify.feedforward, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
+        (identify.add_found, ("m.toml", "m.toml", "none.mcap"), "found nothing that this model"),
+        (identify.agree, ("m.toml", "m.toml"), "no parameter has an interval in both"),
+    ):
+        with pytest.raises(InputError, match=said):
+            call(*given, catalogue=own)
+    with pytest.raises(InputError, match=r"m\.toml: axes\.x: unknown effect 'brake'"):
+        identify.fit("m.toml", "none.mcap")
+
+
 def test_logs_and_models_print_themselves_in_a_line(log) -> None:
     assert repr(log).startswith("<Log of 2 s at 10000 Hz, x: setpoint_position, ")
     least = f"{log.axes['x'].position.min():.4g}"
