@@ -132,6 +132,13 @@ def test_an_object_is_as_it_was_read_and_as_the_schema_says(name: str) -> None:
     valid(found)
 
 
+def test_the_text_of_a_mujoco_file_is_told_where_a_body_is_another_alone() -> None:
+    model = replace(made.MODEL, mjcf="<mujoco/>", mjcf_name="arm.xml")
+    told = json_of(replace(made.diagnosed(), fitted=model))
+    assert 'mujoco = "arm.xml"' in told["model"]
+    assert told["mujoco"] is None
+
+
 def test_what_is_no_number_or_no_law_is_told() -> None:
     c = replace(made.comparison_of(), position_floor={"run 1": 0.0, "run 2": 0.0})
     found = told(made.Comparison(made.MODEL, {"x": c}))

@@ -9,6 +9,7 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import built_results as made
@@ -190,6 +191,21 @@ def test_friction_of_one_direction_is_shown_over_speed(case: Case) -> None:
     found = replace(case.x, final=final, findings=(finding,))
     (view,) = case.subject(case.concluding(found)).views
     assert coordinate_of_answer(view, ["position", "velocity"]) == "velocity"
+
+
+def test_the_place_of_another_axis_is_first_where_an_effect_reads_it(case: Case) -> None:
+    """Else the other axis moves with this one, and its place says little."""
+    (view,) = case.subject(case.concluding(case.quiet)).views
+    other, own = (replace(view.axis.worst[0], coordinate=c) for c in ("other_axis_speed", "speed"))
+    shown = replace(view, axis=SimpleNamespace(worst=(other, own)))
+    assert coordinate_of_answer(shown, ["other_axis_speed", "speed"]) == "speed"
+    coupling = Fitted.at_start(load_catalogue()["axis_coupling"])
+    final = replace(case.x.final, axis=case.x.final.axis.with_effect(coupling))
+    finding = replace(case.x.findings[0], effect="axis_coupling")
+    found = replace(case.x, final=final, findings=(finding,))
+    assert coordinate_of_answer(replace(shown, found=found), ["other_axis_speed"]) == (
+        "other_axis_speed"
+    )
 
 
 def test_the_last_band_of_frequency_is_as_wide_as_it_is(case: Case) -> None:
