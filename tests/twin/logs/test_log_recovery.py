@@ -505,3 +505,13 @@ def test_records_behind_an_attached_log_are_read(tmp_path):
     assert_same_samples(got, log)
     assert got.attachments == attachments
     assert not any("unreadable" in loss for loss in recovery.lost[1:-1])
+
+
+def test_bytes_that_cannot_be_read_are_told_with_their_place(intact: Case, tmp_path: Path) -> None:
+    """What lies between two chunks is unreadable; what lies at the end may be cut off."""
+    between, last = intact.chunks[0].end, intact.chunks[-1].end
+    damaged = flipped(intact.data, between, mask=0xFF)
+    _, recovery = recovered(tmp_path / "damaged.mcap", damaged)
+    assert f"bytes {between} to {intact.chunks[1].start - 1}: unreadable" in recovery.lost
+    _, recovery = recovered(tmp_path / "cut.mcap", intact.data[: last + 5])
+    assert f"bytes {last} to {last + 4}: cut off or unreadable" in recovery.lost
