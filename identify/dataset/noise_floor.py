@@ -177,18 +177,21 @@ def _of_path(axis: AxisModel, log: PreparedLog) -> float:
     """Mean square, N^2, of what laws with memory make of what the readings tell of their path.
 
     As they differ along the path that every second reading tells: of noise that is its error, of
-    what lies between the samples more than it. Not where what they hold balances the force.
+    what lies between the samples more than it. Not where the axis stands, as what they hold there
+    balances the force.
     """
-    motion, told = log.motion, log.told > 0.5
-    if motion.path is None or not told.any():
+    motion = log.motion
+    if motion.path is None:
         return 0.0
+    rests = log.test_function.mean(motion.path.stands.astype(float)) > 0.99
+    told = moving([log], sticks(axis)) & ~rests
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
     if not own.effects:
         return 0.0
     table = on_blocks(own)
     coarse = replace(motion, path=motion.path.of_every_second())
     apart = log.test_function.mean(total_force(table, motion) - total_force(table, coarse))
-    return float(np.mean(apart[told & moving([log], sticks(axis))] ** 2))
+    return float(np.mean(apart[told] ** 2)) if told.any() else 0.0
 
 
 def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:
