@@ -181,13 +181,11 @@ def _of_path(axis: AxisModel, log: PreparedLog) -> float:
     balances the force.
     """
     motion = log.motion
-    if motion.path is None:
+    own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
+    if motion.path is None or not own.effects:
         return 0.0
     rests = log.test_function.mean(motion.path.stands.astype(float)) > 0.99
     told = moving([log], sticks(axis)) & ~rests
-    own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
-    if not own.effects:
-        return 0.0
     table = on_blocks(own)
     coarse = replace(motion, path=motion.path.of_every_second())
     apart = log.test_function.mean(total_force(table, motion) - total_force(table, coarse))
