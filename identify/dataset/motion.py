@@ -380,7 +380,7 @@ def _beside(own: AxisLog, other: OtherAxis | None, whole: int, block: int) -> Ar
     return np.vstack([signals, middle.reshape(len(middle), -1, block).mean(axis=2)])
 
 
-@lru_cache(maxsize=1)  # the axes of a log share it
+@lru_cache(maxsize=2)  # the axes of a log share it, and those of its head
 def _none(count: int) -> Array:
     """Signals (3, count) of another axis where there is none."""
     return np.zeros((3, count))
