@@ -52,13 +52,15 @@ def cores() -> int:
 def parallel(count: int | None = None) -> Iterator[None]:
     """Let ``spread`` use that many threads, one a core where None; the outermost decides.
 
-    Matrices get one thread meanwhile.
+    Matrices get one thread meanwhile. One thread is this one: to hand each job to another that is
+    waited for takes a tenth of a fit.
     """
     if _POOL.get() is not None:
         yield
         return
-    with one_for_matrices(), ThreadPoolExecutor(cores() if count is None else count) as pool:
-        token = _POOL.set(pool)
+    threads = cores() if count is None else count
+    with one_for_matrices(), ThreadPoolExecutor(threads) as pool:  # which starts none by itself
+        token = _POOL.set(pool if threads > 1 else "in a job")
         try:
             yield
         finally:

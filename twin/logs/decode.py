@@ -118,6 +118,16 @@ def samples_by_axis(path: str | Path) -> dict[str, int]:
         return {axis_of(c.topic): (file.counts or {}).get(c.id, 0) for c in axes}
 
 
+def log_metadata(path: str | Path) -> dict[str, str]:
+    """What the writer of a log said of it, without its samples. Raises InputError as read_log."""
+    with _opened(path) as file:
+        extras = Extras()
+        for record in file.selected(()):
+            if record.opcode == Opcode.METADATA:
+                extras.add(record)
+        return extras.metadata
+
+
 @contextmanager
 def _opened(path: str | Path) -> Iterator[McapFile]:
     """The file, with a remedy in the errors that tell of damage."""

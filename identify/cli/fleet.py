@@ -1,0 +1,94 @@
+"""`twin fleet`: many logs of many machines, over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
+
+from identify.cli.command import Commands, Said, progress_on_stderr
+from identify.cli.shared import Effects, app
+
+fleet = Commands(
+    help="Watch many machines: their logs over time, trends and alarms.", rich_markup_mode=None
+)
+app.add_typer(fleet, name="fleet")
+
+StoreOption = Annotated[Path, Option("--store", metavar="DIR", help="Folder of the records.")]
+
+
+@fleet.command()
+def ingest(
+    logs: Annotated[Path, Argument(metavar="FOLDER", help="Folder of MCAP logs, and those below.")],
+    store: StoreOption,
+    model: Annotated[
+        str,
+        Option(
+            "--model",
+            help="Machine model (.toml) of all machines, or a folder with MACHINE.toml of each and "
+            "default.toml of the others.",
+        ),
+    ],
+    pattern: Annotated[
+        str | None,
+        Option(
+            help="Where paths tell machine, axis and start and the logs do not, as "
+            "'{machine}/{started}.mcap'."
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        Option(
+            metavar="ADDRESS",
+            help="Dask scheduler whose workers do it, as tcp://host:8786; this computer if left "
+            "out.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, Option(min=1, help="Processes on this computer; one a core if left out.")
+    ] = None,
+    effects: Effects = None,
+) -> Said:
+    """Check and fit the logs of a folder that the store does not know yet, a record each.
+
+    Example: twin fleet ingest nights --model stage.toml --store fleet
+    """
+    from identify.fleet.engine import needed
+    from identify.fleet.found_logs import Pattern
+    from identify.fleet.ingest import ingest as run
+    from identify.fleet.models import Models
+    from identify.fleet.store import Store
+    from identify.output.answers.fleet import IngestAnswer
+    from identify.output.words.fleet import ingested_in_words
+
+    needed("pyarrow")
+    known = Models.at(model, effects or ())
+    read = None if pattern is None else Pattern(pattern)
+    with progress_on_stderr() as progress:
+        done = run(
+            logs, Store.made(store), known, pattern=read, scheduler=scheduler, workers=workers,
+            progress=progress,
+        )  # fmt: skip
+    return Said(ingested_in_words(done), IngestAnswer.of(done), done.told)
+
+
+@fleet.command()
+def sql(
+    query: Annotated[str, Argument(metavar="SELECT", help="A question about fits, findings, alarms.")],
+    store: StoreOption,
+    out: Annotated[Path | None, Option("--out", "-o", help="Table to write: .csv, .parquet.")] = None,
+) -> Said:
+    """Answer a question in SQL over the views fits, findings and alarms.
+
+    Example: twin fleet sql "SELECT machine, max(value) FROM fits GROUP BY machine" --store fleet
+    """
+    from identify.fleet.sql import ask
+    from identify.output.answers.fleet import SqlAnswer
+    from identify.output.words.fleet import table_text
+
+    found = ask(query, store)
+    if out:
+        found.write(out)
+    text = f"{out}: {len(found)} rows" if out else table_text(found.columns, found.rows)
+    return Said(text, SqlAnswer.of(columns=found.columns, rows=found.rows), found.faults)

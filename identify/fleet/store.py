@@ -1,0 +1,183 @@
+"""A store: a folder with one Parquet file a log, named by what it was made of, and packed ones.
+
+``records/KEY.parquet`` appears whole, by a rename, so that whoever writes it twice leaves one file.
+``packed/DIGEST.parquet`` holds the rows of many, whose own files are removed behind it: a run that
+is killed between leaves rows twice, which every reader counts once, by their key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from identify.fleet.columns import RECORD, Column
+from identify.fleet.engine import needed
+from twin.errors import InputError
+from twin.files import make_folder, write_atomically
+
+NAME = re.compile(r"[0-9a-f]{64}\.parquet")  # of a record: its key
+TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32"}
+PACK_FROM = 1000  # records from which they are packed: each is a file to open
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Store:
+    """The records below a folder."""
+
+    root: Path
+
+    @classmethod
+    def made(cls, root: Path) -> Store:
+        """A store that is there afterwards. Raises InputError where that is not possible."""
+        store = cls(root)
+        for folder in (store.records, store.packed):
+            make_folder(folder)
+        return store
+
+    @classmethod
+    def opened(cls, root: Path) -> Store:
+        """A store that is there. Raises InputError."""
+        store = cls(root)
+        if not store.records.is_dir():
+            raise InputError(
+                f"--store {root}: is no store; make it with `twin fleet ingest FOLDER --store "
+                f"{root}`"
+            )
+        return store
+
+    @property
+    def records(self) -> Path:
+        return self.root / "records"
+
+    @property
+    def packed(self) -> Path:
+        return self.root / "packed"
+
+    def file(self, key: str) -> Path:
+        """The file of a record."""
+        return self.records / f"{key}.parquet"
+
+    def has(self, key: str) -> bool:
+        """Whether a record is there, packed or not."""
+        return self.file(key).exists() or any(key in keys_of(p) for p in _packed(self.packed))
+
+    def write(self, key: str, rows: Sequence[Row]) -> None:
+        """Write a record, whole or not at all; the same rows give the same bytes."""
+        write_atomically(self.file(key), parquet(rows, RECORD))
+
+    def contents(self) -> Contents:
+        """What is in it now, and which files cannot be used."""
+        return Contents.of(self)
+
+    def pack(self, least: int = PACK_FROM) -> int:
+        """Put records into one file where there are that many; how many that were.
+
+        Packing twice at once only writes the same rows twice.
+        """
+        pa, pq = needed("pyarrow"), needed("pyarrow.parquet")
+        names = sorted(p.name for p in self.records.glob("*.parquet") if NAME.fullmatch(p.name))
+        if len(names) < least:
+            return 0
+        tables, used = [], []
+        for name in names:
+            if fault(self.records / name) is None:
+                tables.append(pq.read_table(self.records / name))
+                used.append(name)
+        if not used:
+            return 0
+        stream = BytesIO()
+        pq.write_table(pa.concat_tables(tables), stream, compression="zstd")
+        digest = hashlib.sha256("\n".join(used).encode()).hexdigest()
+        write_atomically(self.packed / f"{digest}.parquet", stream.getvalue())
+        for name in used:
+            (self.records / name).unlink(missing_ok=True)
+        return len(used)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The files of a store that can be read. faults: of the others, a line each."""
+
+    singles: tuple[Path, ...]
+    packed: tuple[Path, ...]
+    faults: tuple[str, ...]
+
+    @classmethod
+    def of(cls, store: Store) -> Contents:
+        """Look at every file; what is cut short or of another schema is told, and left out."""
+        found: dict[Path, list[Path]] = {store.records: [], store.packed: []}
+        faults = []
+        for folder, good in found.items():
+            for path in sorted(folder.glob("*.parquet")):
+                why = fault(path)
+                if why is None:
+                    good.append(path)
+                else:
+                    faults.append(f"{path}: {why}; its logs are computed again once it is removed")
+        return cls(tuple(found[store.records]), tuple(found[store.packed]), tuple(faults))
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """All of them, packed ones first."""
+        return (*self.packed, *self.singles)
+
+    @cached_property
+    def digest(self) -> str:
+        """Of which files there are; what was made of these need not be made again."""
+        return hashlib.sha256("\n".join(p.name for p in self.paths).encode()).hexdigest()
+
+
+def fault(path: Path) -> str | None:
+    """Why a file is no record, or None where it is one."""
+    pq, pa = needed("pyarrow.parquet"), needed("pyarrow")
+    if not NAME.fullmatch(path.name):
+        return "is not named as a record is"
+    try:
+        found = pq.read_schema(path)
+    except (OSError, pa.ArrowException) as error:
+        return f"cannot be read ({_first(error)})"
+    return None if found.equals(schema(RECORD)) else "has other columns than a record has"
+
+
+def schema(columns: Iterable[Column]) -> Any:
+    """The Arrow schema of columns, without metadata."""
+    pa = needed("pyarrow")
+    kinds = {c.name: TYPES.get(c.kind) for c in columns}
+    return pa.schema(
+        [(n, getattr(pa, kind)() if kind else pa.timestamp("us")) for n, kind in kinds.items()]
+    )
+
+
+def parquet(rows: Sequence[Row], columns: Iterable[Column]) -> bytes:
+    """Rows as a Parquet file; an entry that a row lacks is null."""
+    pa, pq = needed("pyarrow"), needed("pyarrow.parquet")
+    known, stream = schema(columns), BytesIO()
+    arrays = [pa.array([row.get(f.name) for row in rows], f.type) for f in known]
+    pq.write_table(pa.table(arrays, schema=known), stream, compression="zstd")
+    return stream.getvalue()
+
+
+@lru_cache(maxsize=None)  # a packed file has the name of what is in it, and never changes
+def keys_of(path: Path) -> frozenset[bytes | str]:
+    """The keys of a packed file; none of one that cannot be read."""
+    pq = needed("pyarrow.parquet")
+    if fault(path) is not None:
+        return frozenset()
+    return frozenset(pq.read_table(path, columns=["key"]).column(0).unique().to_pylist())
+
+
+def _packed(folder: Path) -> Iterator[Path]:
+    yield from sorted(folder.glob("*.parquet"))
+
+
+def _first(error: BaseException) -> str:
+    """The first words of what a library says, in one line."""
+    most = 80  # characters
+    return " ".join(str(error).split())[:most]
