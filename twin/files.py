@@ -138,15 +138,34 @@ def _opened(target: Path, name: str) -> Iterator[BinaryIO]:
     with ExitStack() as leaving:
         if not part.exists():  # else it may be another run's, until it is locked
             _note(part, leaving)
-        stream = leaving.enter_context(open(part, "ab"))
-        try:
-            _lock(stream)
-        except BlockingIOError as error:
-            raise InputError(f"{part}: another run is writing it; give another name") from error
+        stream = leaving.enter_context(_held(part))
         _note(part, leaving)
         if stream.tell():  # a killed run has left it
             stream.truncate(0)
         yield stream
+
+
+def _held(part: Path) -> BinaryIO:
+    """The file, locked; opened anew where another run has taken it for a killed run's and removed it.
+
+    Between its opening and its lock it looks like one.
+    """
+    while True:
+        stream = open(part, "ab")
+        try:
+            _lock(stream)
+            there = os.stat(part)
+            if os.path.samestat(there, os.fstat(stream.fileno())):
+                return stream
+        except FileNotFoundError:
+            pass
+        except BlockingIOError as error:
+            if part.suffix != PART:
+                stream.close()
+                raise InputError(
+                    f"{part}: another run is writing it; give another name"
+                ) from error
+        stream.close()
 
 
 def _note(part: Path, leaving: ExitStack) -> None:
