@@ -66,7 +66,9 @@ ALARM = (
     Column("half_width", "DOUBLE", "unit", "of the 90 % band of size"),
     Column("strength", "DOUBLE", "1", "the size over its standard deviation, dead band taken off"),
     Column("scope", "VARCHAR", "", "machine, or hall: it changed in all machines of a kind at once"),
+    Column("steps", "BIGINT", "", "how often it changed that way by now: what grows does so again"),
     Column("others", "VARCHAR", "", "other parameters of the axis that changed with it"),
 )  # fmt: skip
+TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32", "BIGINT": "int64"}  # of Arrow
 RECORD = (Column("kind", "VARCHAR", "", "fit or finding"), *LOG, *FIT, *FINDING)
 VIEWS = {"fits": (*LOG, *FIT), "findings": (*LOG, *FINDING), "alarms": ALARM}

@@ -16,13 +16,12 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from identify.fleet.columns import RECORD, Column
+from identify.fleet.columns import RECORD, TYPES, Column
 from identify.fleet.engine import needed
 from twin.errors import InputError
 from twin.files import make_folder, write_atomically
 
 NAME = re.compile(r"[0-9a-f]{64}\.parquet")  # of a record: its key
-TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32"}
 PACK_FROM = 1000  # records from which they are packed: each is a file to open
 Row = Mapping[str, Any]
 
@@ -60,6 +59,11 @@ class Store:
     def packed(self) -> Path:
         return self.root / "packed"
 
+    @property
+    def alarms(self) -> Path:
+        """The file of what was told of these records."""
+        return self.root / "alarms.parquet"
+
     def file(self, key: str) -> Path:
         """The file of a record."""
         return self.records / f"{key}.parquet"
@@ -70,7 +74,7 @@ class Store:
 
     def write(self, key: str, rows: Sequence[Row]) -> None:
         """Write a record, whole or not at all; the same rows give the same bytes."""
-        write_atomically(self.file(key), parquet(rows, RECORD))
+        write_atomically(self.file(key), parquet(table(rows, RECORD)))
 
     def contents(self) -> Contents:
         """What is in it now, and which files cannot be used."""
@@ -92,10 +96,8 @@ class Store:
                 used.append(name)
         if not used:
             return 0
-        stream = BytesIO()
-        pq.write_table(pa.concat_tables(tables), stream, compression="zstd")
         digest = hashlib.sha256("\n".join(used).encode()).hexdigest()
-        write_atomically(self.packed / f"{digest}.parquet", stream.getvalue())
+        write_atomically(self.packed / f"{digest}.parquet", parquet(pa.concat_tables(tables)))
         for name in used:
             (self.records / name).unlink(missing_ok=True)
         return len(used)
@@ -155,12 +157,17 @@ def schema(columns: Iterable[Column]) -> Any:
     )
 
 
-def parquet(rows: Sequence[Row], columns: Iterable[Column]) -> bytes:
-    """Rows as a Parquet file; an entry that a row lacks is null."""
-    pa, pq = needed("pyarrow"), needed("pyarrow.parquet")
-    known, stream = schema(columns), BytesIO()
+def table(rows: Sequence[Row], columns: Iterable[Column]) -> Any:
+    """Rows as an Arrow table; an entry that a row lacks is null."""
+    pa, known = needed("pyarrow"), schema(columns)
     arrays = [pa.array([row.get(f.name) for row in rows], f.type) for f in known]
-    pq.write_table(pa.table(arrays, schema=known), stream, compression="zstd")
+    return pa.table(arrays, schema=known)
+
+
+def parquet(content: Any) -> bytes:
+    """An Arrow table as a Parquet file."""
+    stream = BytesIO()
+    needed("pyarrow.parquet").write_table(content, stream, compression="zstd")
     return stream.getvalue()
 
 
