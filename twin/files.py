@@ -146,25 +146,22 @@ def _opened(target: Path, name: str) -> Iterator[BinaryIO]:
 
 
 def _held(part: Path) -> BinaryIO:
-    """The file, locked; opened anew where another run has taken it for a killed run's and removed it.
+    """The file, locked; opened anew where another run has swept it before it was.
 
-    Between its opening and its lock it looks like one.
+    Until its lock it looks like one that a killed run has left.
     """
     while True:
         stream = open(part, "ab")
         try:
             _lock(stream)
-            there = os.stat(part)
-            if os.path.samestat(there, os.fstat(stream.fileno())):
+            if os.path.samestat(os.stat(part), os.fstat(stream.fileno())):
                 return stream
         except FileNotFoundError:
             pass
         except BlockingIOError as error:
-            if part.suffix != PART:
-                stream.close()
-                raise InputError(
-                    f"{part}: another run is writing it; give another name"
-                ) from error
+            if part.suffix != PART:  # else it is being swept
+                text = f"{part}: another run is writing it; give another name"
+                raise InputError(text) from error
         stream.close()
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Commands, Said, progress_on_stderr
-from identify.cli.shared import Effects, app
+from identify.cli.command import Commands, Said, progress_on_stderr, tried
+from identify.cli.shared import Effects, app, written
+from twin.errors import InputError
 
 fleet = Commands(
     help="Watch many machines: their logs over time, trends and alarms.", rich_markup_mode=None
@@ -75,20 +77,71 @@ def ingest(
 
 @fleet.command()
 def sql(
-    query: Annotated[str, Argument(metavar="SELECT", help="A question about fits, findings, alarms.")],
+    query: Annotated[
+        str, Argument(metavar="SELECT", help="A question about fits, findings, alarms.")
+    ],
     store: StoreOption,
-    out: Annotated[Path | None, Option("--out", "-o", help="Table to write: .csv, .parquet.")] = None,
+    out: Annotated[Path | None, written("Table to write: .csv, .parquet.")] = None,
 ) -> Said:
     """Answer a question in SQL over the views fits, findings and alarms.
 
     Example: twin fleet sql "SELECT machine, max(value) FROM fits GROUP BY machine" --store fleet
     """
     from identify.fleet.sql import ask
+    from identify.fleet.store import Store
     from identify.output.answers.fleet import SqlAnswer
     from identify.output.words.fleet import table_text
 
-    found = ask(query, store)
+    found = ask(query, Store.opened(store))
     if out:
         found.write(out)
     text = f"{out}: {len(found)} rows" if out else table_text(found.columns, found.rows)
     return Said(text, SqlAnswer.of(columns=found.columns, rows=found.rows), found.faults)
+
+
+@fleet.command()
+def report(
+    store: StoreOption,
+    html: Annotated[Path | None, written("HTML page.")] = None,
+    logs: Annotated[
+        Path | None,
+        Option(
+            "--logs",
+            metavar="FOLDER",
+            help="Folder that was ingested: the nights after an alarm of the force error are "
+            "diagnosed.",
+        ),
+    ] = None,
+    model: Annotated[
+        str | None, Option("--model", help="As for `twin fleet ingest`; with --logs.")
+    ] = None,
+    effects: Effects = None,
+) -> Said:
+    """Tell which machines changed, when and by how much, on a page ranked by what needs attention.
+
+    Exit code 1 where a machine changed.
+
+    Example: twin fleet report --store fleet -o fleet.html
+    """
+    from identify.fleet.engine import needed
+    from identify.fleet.state import floor_of
+    from identify.fleet.store import Store
+    from identify.output.answers.fleet import FloorAnswer
+    from identify.output.report.fleet import write_fleet
+    from identify.output.words.fleet import floor_in_words
+
+    needed("duckdb")
+    if (logs is None) != (model is None):
+        raise InputError("--logs and --model: give both, or neither")
+    with progress_on_stderr() as progress:
+        progress("reading the records", 0, 1)
+        floor = floor_of(Store.opened(store))
+        if logs and model:
+            from identify.fleet.cause import with_causes
+            from identify.fleet.models import Models
+
+            floor = with_causes(floor, logs, Models.at(model, effects or ()), progress)
+    failed = tried(lambda: write_fleet(html, floor)) if html else ()
+    answer = FloorAnswer.of(floor, alarms=floor.alarms)
+    said = Said(floor_in_words(floor), answer, floor.faults, fine=not floor.alarms)
+    return replace(said, unwritten=failed)

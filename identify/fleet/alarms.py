@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -156,8 +156,8 @@ def _chains(
     """The alarms of a series; changes the same way, one behind the other, are one that grows."""
     found = changes(values, variances, shown.dead, level)
     edges = [0, *(c.first for c in found), len(values)]
-    means = [float(np.mean(values[a:b])) for a, b in zip(edges, edges[1:], strict=False)]
-    ups = [after > before for before, after in zip(means, means[1:], strict=False)]
+    means = [float(np.mean(values[a:b])) for a, b in pairwise(edges)]
+    ups = [after > before for before, after in pairwise(means)]
     start = 0
     for _, own in groupby(ups):
         stop = start + len(list(own))

@@ -36,8 +36,12 @@ FIT = (
     Column("value", "DOUBLE", "unit", "the estimate"),
     Column("low", "DOUBLE", "unit", "low end of its 90 % interval; null where it has none"),
     Column("high", "DOUBLE", "unit", "high end of it"),
-    Column("spread", "DOUBLE", "unit", "half the width within which parts of the log scatter (90 %)"),
-    Column("no_interval", "VARCHAR", "", "why it has none: NotExcited, Inseparable, ModelWrong, ..."),
+    Column(
+        "spread", "DOUBLE", "unit", "half the width within which parts of the log scatter (90 %)"
+    ),
+    Column(
+        "no_interval", "VARCHAR", "", "why it has none: NotExcited, Inseparable, ModelWrong, ..."
+    ),
     Column("error", "DOUBLE", "force_unit", "force error of the fit, RMS"),
     Column("floor", "DOUBLE", "force_unit", "noise floor of the log, RMS"),
     Column("force_unit", "VARCHAR", "", "N, or N m on a rotary axis"),
@@ -47,7 +51,9 @@ FIT = (
 )
 FINDING = (
     Column("severity", "VARCHAR", "", "error: the log was not fitted; warning: it was"),
-    Column("fault", "VARCHAR", "", "UNREADABLE, UNNAMED, NO_MODEL, UNFITTED, or as in `twin check`"),
+    Column(
+        "fault", "VARCHAR", "", "UNREADABLE, UNNAMED, NO_MODEL, UNFITTED, or as in `twin check`"
+    ),
     Column("what", "VARCHAR", "", "the fault in words, with its place, size and remedy"),
 )
 ALARM = (
@@ -65,8 +71,8 @@ ALARM = (
     Column("size", "DOUBLE", "unit", "after minus before"),
     Column("half_width", "DOUBLE", "unit", "of the 90 % band of size"),
     Column("strength", "DOUBLE", "1", "the size over its standard deviation, dead band taken off"),
-    Column("scope", "VARCHAR", "", "machine, or hall: it changed in all machines of a kind at once"),
-    Column("steps", "BIGINT", "", "how often it changed that way by now: what grows does so again"),
+    Column("scope", "VARCHAR", "", "machine, or hall: all of a kind changed at once"),
+    Column("steps", "BIGINT", "", "how often it changed that way by now: above 1 it grows"),
     Column("others", "VARCHAR", "", "other parameters of the axis that changed with it"),
 )  # fmt: skip
 TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32", "BIGINT": "int64"}  # of Arrow

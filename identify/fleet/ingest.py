@@ -55,9 +55,7 @@ def ingest(
     )  # fmt: skip
 
 
-def _tasks(
-    folder: Path, store: Store, models: Models, pattern: Pattern | None
-) -> Iterator[Task]:
+def _tasks(folder: Path, store: Store, models: Models, pattern: Pattern | None) -> Iterator[Task]:
     return (Task(folder, name, store, models, pattern) for name in logs_below(folder))
 
 

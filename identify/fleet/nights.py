@@ -80,8 +80,8 @@ def panels(contents: Contents) -> Iterator[Panel]:
 
 def _panel(base: Any, which: Sequence[str], unit: str) -> Panel:
     where = "WHERE model = $1 AND axis = $2 AND parameter = $3"
-    machines = [row[0] for row in base.execute(
-        f"SELECT DISTINCT machine FROM nightly {where} ORDER BY ALL", which).fetchall()]  # fmt: skip
+    distinct = f"SELECT DISTINCT machine FROM nightly {where} ORDER BY ALL"
+    machines = [row[0] for row in base.execute(distinct, which).fetchall()]
     found = base.execute(
         f"SELECT dense_rank() OVER (ORDER BY machine) - 1 AS row, day, value, spread, temperature, "
         f"distance FROM nightly {where}",

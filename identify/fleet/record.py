@@ -148,7 +148,8 @@ def _known(task: Task) -> tuple[dict[str, Any], str, tuple[Origin, Machine] | Re
     key = hashlib.sha256(repr(parts).encode()).hexdigest()
     about = {
         "log": task.name, "log_sha256": task.digest, "version": version, "key": key,
-        "model_sha256": model if machine else None, "model": machine.model.name if machine else None,
+        "model_sha256": model if machine else None,
+        "model": machine.model.name if machine else None,
         "machine": origin.machine if origin else None,
         "started": origin.started if origin else None, "night": origin.night if origin else None,
     }  # fmt: skip

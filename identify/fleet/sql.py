@@ -12,7 +12,7 @@ from identify.fleet.columns import VIEWS, Column
 from identify.fleet.engine import needed
 from identify.fleet.kept_alarms import alarms, as_table
 from identify.fleet.store import Store
-from identify.fleet.views import connected
+from identify.fleet.views import connected, listed
 from twin.errors import InputError
 from twin.files import write_atomically
 
@@ -32,7 +32,7 @@ class Found:
         return len(self.rows)
 
     def write(self, path: Path) -> None:
-        """Write the rows as a table; raises InputError for an ending that is none of ``WRITERS``."""
+        """Write the rows as a table. Raises InputError for an ending not in ``WRITERS``."""
         if path.suffix not in WRITERS:
             raise InputError(f"--out {path}: end the name in {' or '.join(WRITERS)}")
         stream = BytesIO()
@@ -54,9 +54,9 @@ def ask(query: str, store: Store) -> Found:
                 raise InputError(f"{query:.60}: is not one SELECT; a store is only read")
             if "alarms" in query.lower():
                 base.register("alarms", as_table(alarms(store, contents)))
+            base.execute(f"SET allowed_paths = {listed(contents.paths)}")
             base.execute("SET enable_external_access = false")
-            answer = base.execute(query)
-            table = answer.to_arrow_table()
+            table = base.sql(query).to_arrow_table()
         except duckdb.Error as error:
             raise InputError(f"{' '.join(str(error).split())}; {_known()}") from error
     columns = tuple(table.column_names)

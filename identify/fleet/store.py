@@ -11,7 +11,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -171,7 +171,7 @@ def parquet(content: Any) -> bytes:
     return stream.getvalue()
 
 
-@lru_cache(maxsize=None)  # a packed file has the name of what is in it, and never changes
+@cache  # a packed file has the name of what is in it, and never changes
 def keys_of(path: Path) -> frozenset[bytes | str]:
     """The keys of a packed file; none of one that cannot be read."""
     pq = needed("pyarrow.parquet")

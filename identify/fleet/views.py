@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from identify.fleet.columns import RECORD, VIEWS
@@ -26,7 +28,7 @@ def _rows_of(base: Any, contents: Contents) -> str:
     if not contents.paths:
         base.register("nothing", table((), RECORD))
         return "nothing"
-    files = "[" + ", ".join(_quoted(str(p)) for p in contents.paths) + "]"
+    files = listed(contents.paths)
     named = f"read_parquet({files}, filename = true)"
     places, keys = base.execute(
         f"SELECT sum(files), count(*) FROM (SELECT count(DISTINCT filename) AS files FROM {named} "
@@ -40,5 +42,7 @@ def _rows_of(base: Any, contents: Contents) -> str:
     return f"(SELECT r.* FROM {named} r JOIN places USING (key, filename))"
 
 
-def _quoted(text: str) -> str:
-    return "'" + text.replace("'", "''") + "'"
+def listed(paths: Sequence[Path]) -> str:
+    """Paths as a list in SQL."""
+    texts = (str(p).replace("'", "''") for p in paths)
+    return "[" + ", ".join(f"'{text}'" for text in texts) + "]"

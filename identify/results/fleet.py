@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from enum import Enum
 from pathlib import Path
+
+from twin.signals import Array
 
 
 @dataclass(frozen=True)
@@ -64,3 +67,84 @@ class Alarm:
     def relative(self) -> float:
         """The size over what was before."""
         return self.size / abs(self.before) if self.before else float("inf")
+
+
+@dataclass(frozen=True)
+class Off:
+    """A machine whose parameter is far from its kind's; far: in deviations between machines."""
+
+    machine: str
+    axis: str
+    parameter: str
+    unit: str
+    value: float
+    usual: float
+    far: float
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A parameter of a machine over n nights, not a number where there is none.
+
+    days (n,): since 1970-01-01. distance (n,): travelled by then in its logs, m or rad. values
+    (n,): as they were fitted; alone (n,): less what all machines of its kind did; half (n,): of the
+    band within which parts of a log scatter (90 %). usual (n,): median of its kind.
+    """
+
+    axis: str
+    parameter: str
+    unit: str
+    days: Array
+    distance: Array
+    values: Array
+    alone: Array
+    half: Array
+    usual: Array
+
+
+@dataclass(frozen=True)
+class MachineState:
+    """How a machine stands. nights: that were fitted; last: the last of them; faulty: bad logs.
+
+    ratio: force error over noise floor in the last nights, the largest of its axes.
+    """
+
+    machine: str
+    model: str
+    nights: int
+    last: date | None
+    faulty: int
+    ratio: float
+    alarms: tuple[Alarm, ...]
+    off: tuple[Off, ...]
+
+    @property
+    def attention(self) -> tuple[float, float, float]:
+        """What machines are ranked by: alarms, being off from the kind, bad logs."""
+        return (
+            max((a.strength for a in self.alarms), default=0.0),
+            max((o.far for o in self.off), default=0.0),
+            self.faulty / max(self.nights + self.faulty, 1),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """All machines of a store, what needs attention first. courses: of those that are drawn.
+
+    hall: what changed in all machines of a kind at once.
+    faults: files of the store that cannot be used, a line each; causes: by alarm the effects that
+    a diagnosis of the nights after it names.
+    """
+
+    store: Path
+    machines: tuple[MachineState, ...]
+    hall: tuple[Alarm, ...]
+    courses: Mapping[str, tuple[Course, ...]]
+    causes: Mapping[Alarm, tuple[str, ...]]
+    faults: tuple[str, ...]
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Those of single machines."""
+        return tuple(alarm for machine in self.machines for alarm in machine.alarms)

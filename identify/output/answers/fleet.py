@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import date
 from typing import Any
 
-from identify.output.answers import Answer, File
+from identify.output.answers import Answer, Entry, File, Number
 
 
 class IngestAnswer(Answer):
@@ -28,3 +29,56 @@ class SqlAnswer(Answer):
 
     columns: list[str]
     rows: list[list[Any]]
+
+
+class AlarmEntry(Entry):
+    """A change of a machine, or of the hall (machine: null), beyond the stated false-alarm rate."""
+
+    machine: str | None
+    axis: str
+    model: str
+    parameter: str
+    unit: str
+    night: date
+    changed: date
+    earliest: date
+    latest: date
+    before: Number
+    after: Number
+    size: Number
+    half_width: Number
+    steps: int
+    others: list[str]
+
+
+class OffEntry(Entry):
+    """A parameter far from what its kind has; far: standard deviations between machines."""
+
+    axis: str
+    parameter: str
+    unit: str
+    value: Number
+    usual: Number
+    far: Number
+
+
+class MachineEntry(Entry):
+    """How a machine stands; ratio: force error over noise floor in the last nights."""
+
+    machine: str
+    model: str
+    nights: int
+    last: date | None
+    faulty: int
+    ratio: Number
+    off: list[OffEntry]
+
+
+class FloorAnswer(Answer):
+    """What `twin fleet report` prints: machines by what needs attention, and all alarms."""
+
+    store: File
+    machines: list[MachineEntry]
+    alarms: list[AlarmEntry]
+    hall: list[AlarmEntry]
+    faults: list[str]

@@ -82,7 +82,10 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class Chart(Block):
-    """Lines over common horizontal values in printed units, drawn in the reader's browser."""
+    """Lines over common horizontal values in printed units, drawn in the reader's browser.
+
+    dates: whether these are seconds since 1970, which are printed as days.
+    """
 
     x: tuple[str, Array]
     y: str
@@ -90,13 +93,15 @@ class Chart(Block):
     caption: str = ""
     log_x: bool = False
     log_y: bool = False
+    dates: bool = False
 
     @property
     def spec(self) -> dict[str, Any]:
         """What report.js draws."""
         edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is Line.BAND]
+        x = self.x[1].tolist() if self.dates else printed(self.x[1])
         return {
-            "x": {"label": self.x[0], "values": printed(self.x[1]), "log": self.log_x},
+            "x": {"label": self.x[0], "values": x, "log": self.log_x, "dates": self.dates},
             "y": {"label": self.y, "log": self.log_y},
             "series": [
                 {"label": typeset(d.label), "values": printed(d.values), "kind": d.line.value,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from identify.output.numbers import NOTHING, number
-from identify.results.fleet import Ingested
+from identify.output.numbers import NOTHING, listed, number, percent, quantity, with_band
+from identify.results.fleet import Alarm, Floor, Ingested, MachineState, Off
 
 
 def ingested_in_words(done: Ingested) -> str:
@@ -20,7 +20,7 @@ def ingested_in_words(done: Ingested) -> str:
 
 
 def table_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """A table for the terminal, its columns one below the other."""
+    """A table for the terminal, its columns one beside the other."""
     lines = [list(columns), *([_cell(value) for value in row] for row in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(columns))]
     return "\n".join("  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
@@ -32,3 +32,66 @@ def _cell(value: Any) -> str:
         return NOTHING
     digits = 6  # significant, of a number that may be used elsewhere
     return number(value, digits) if isinstance(value, float) else str(value)
+
+
+def named(parameter: str) -> str:
+    """What a parameter is called in a sentence."""
+    return "force error of the fit" if parameter == "force_error" else parameter
+
+
+def size_in_words(alarm: Alarm) -> str:
+    """By how much a parameter changed: with its band, and as a share of what it was."""
+    share = f" ({'+' if alarm.size > 0 else ''}{percent(alarm.relative)})" if alarm.before else ""
+    return f"{with_band(alarm.size, alarm.half_width, alarm.unit)}{share}"
+
+
+def change_in_words(alarm: Alarm) -> str:
+    """What changed, by how much and since when."""
+    what, verb = named(alarm.parameter), "grows" if alarm.size > 0 else "falls"
+    verb = verb if alarm.steps > 1 else "rose" if alarm.size > 0 else "fell"
+    since = "since" if alarm.steps > 1 else "on"
+    before, after = (quantity(v, alarm.unit) for v in (alarm.before, alarm.after))
+    said = f"{what} of axis {alarm.axis} {verb} {since} {night_in_words(alarm)}: "
+    said += f"{size_in_words(alarm)}, from {before} to {after}"
+    return said + (f"; with it changed {listed(alarm.others)}" if alarm.others else "")
+
+
+def night_in_words(alarm: Alarm) -> str:
+    """The date of a change with its band."""
+    if alarm.earliest == alarm.latest:
+        return f"{alarm.changed}"
+    return f"{alarm.changed} ({alarm.earliest} to {alarm.latest})"
+
+
+def alarm_in_words(alarm: Alarm, cause: Sequence[str] = ()) -> str:
+    """An alarm in a sentence, with what a diagnosis names as its cause."""
+    who = alarm.machine or f"all machines of kind {alarm.model}"
+    why = f"; a diagnosis of the nights after it names {listed(cause)}" if cause else ""
+    return f"{who}: {change_in_words(alarm)}, told after the night of {alarm.night}{why}"
+
+
+def off_in_words(off: Off) -> str:
+    """By how much a machine is off from its kind."""
+    own, usual = (quantity(v, off.unit) for v in (off.value, off.usual))
+    return (
+        f"{named(off.parameter)} of axis {off.axis} is {own}, of its kind {usual} is usual: "
+        f"{number(off.far, 2)} standard deviations of what machines differ by"
+    )
+
+
+def state_in_words(state: MachineState) -> str:
+    """What a machine needs attention for, in a few words."""
+    parts = [named(a.parameter) for a in state.alarms]
+    parts += [f"{named(o.parameter)} off from its kind" for o in state.off]
+    parts += [f"{state.faulty} bad logs"] if state.faulty else []
+    return ", ".join(dict.fromkeys(parts)) or NOTHING
+
+
+def floor_in_words(floor: Floor) -> str:
+    """All alarms, those of the hall first."""
+    lines = [alarm_in_words(alarm) for alarm in floor.hall]
+    lines += [alarm_in_words(a, floor.causes.get(a, ())) for a in floor.alarms]
+    lines += [f"{o.machine}: {off_in_words(o)}" for m in floor.machines for o in m.off]
+    count = len({a.machine for a in floor.alarms})
+    head = f"{len(floor.machines)} machines, {count} of them changed"
+    return "\n".join([head, *lines])

@@ -332,10 +332,11 @@ for (const place of document.querySelectorAll("[data-chart]")) {
     line: {}, dash: {dash: [7, 5]}, steps: {paths: uPlot.paths.stepped({align: 1, alignGaps: 1})},
     stems: {paths: uPlot.paths.bars({size: [0.15, 8, 2], align: 0}), fill: BEFORE},
   };
-  const log = on => on ? {distr: 3} : {};
+  const log = on => on ? {distr: 3} : {}, day = v => v == null ? "–" : new Date(v * 1e3).toISOString().slice(0, 10);
   plot(place, {
-    height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => digits(v)},
-    scales: {x: {time: false, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
+    height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => spec.x.dates ? day(v) : digits(v)},
+    tzDate: v => uPlot.tzDate(new Date(v * 1e3), "Etc/UTC"),
+    scales: {x: {time: spec.x.dates, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
     series: spec.series.map(s => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind], width: s.kind === "band" ? 0.5 : 1.5})),
     cursor: {drag: {x: true, y: false}},
   }, [spec.x.values, ...spec.series.map(s => s.values)]);

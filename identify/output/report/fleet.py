@@ -1,0 +1,194 @@
+"""The page of a fleet: machines by what needs attention, their parameters over time, alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from identify.output.numbers import (
+    NOTHING,
+    DisplayUnit,
+    capitalised,
+    listed,
+    number,
+    quantity,
+)
+from identify.output.report.page import (
+    AnswerBlock,
+    Block,
+    Chart,
+    Drawn,
+    Ink,
+    Line,
+    Listing,
+    Section,
+    TableBlock,
+    Tile,
+    Tone,
+)
+from identify.output.report.page import page as whole_page
+from identify.output.words.fleet import (
+    alarm_in_words,
+    change_in_words,
+    named,
+    night_in_words,
+    off_in_words,
+    size_in_words,
+    state_in_words,
+)
+from identify.results.fleet import Alarm, Course, Floor, MachineState
+from twin.files import write_atomically
+from twin.signals import Array
+
+DAY = 86_400.0  # s
+MOST_ROWS = 200  # of machines that need no attention
+
+
+def write_fleet(path: Path, floor: Floor) -> None:
+    """Write the page of a floor, whole or not at all. Raises InputError."""
+    drawn = [m for m in floor.machines if m.machine in floor.courses]
+    shown = [
+        Section("answer", "What needs attention", [_answer(floor)]),
+        Section("alarms", "Alarms", _alarms(floor)),
+        Section("machines", "All machines", [_machines(floor)]),
+        *(Section(f"machine-{i}", m.machine, _machine(floor, m)) for i, m in enumerate(drawn)),
+    ]
+    facts = [("Store", str(floor.store)), ("Machines", str(len(floor.machines)))]
+    last = max((m.last for m in floor.machines if m.last), default=None)
+    facts += [("Last night", str(last))] if last else []
+    warnings = [("Store", line) for line in floor.faults]
+    made = [("Date", date.today().isoformat())]
+    text = whole_page("Machines over time", facts, shown, (), made, warnings)
+    write_atomically(path, text.encode("utf-8"))
+
+
+def _answer(floor: Floor) -> Block:
+    changed = [m for m in floor.machines if m.alarms]
+    apart = [m for m in floor.machines if m.off]
+    bad = sum(m.faulty for m in floor.machines)
+    names = listed([m.machine for m in changed[:5]]) if changed else ""
+    more = f" and {len(changed) - 5} more" if len(changed) > 5 else ""
+    headline = f"{len(changed)} of {len(floor.machines)} machines changed"
+    sentences = [f"Look first at {names}{more}."] if changed else ["No machine has changed."]
+    if floor.hall:
+        sentences.append("What all machines did at once is told as the hall's, not as theirs.")
+    tiles = [
+        Tile("Machines that changed", str(len(changed)), f"of {len(floor.machines)}"),
+        Tile("Off from their kind", str(len(apart)), "by more than machines differ"),
+        Tile("Changes of the hall", str(len(floor.hall)), "in all machines at once"),
+        Tile("Bad logs", str(bad), "were not fitted"),
+    ]
+    remarks = [
+        "A healthy machine raises one alarm in 1000 nights or more, by simulation. A change below "
+        "1 % of a parameter, or 25 % of the force error, is no alarm.",
+    ]
+    return AnswerBlock(
+        headline, " ".join(sentences), tiles, remarks, Tone.STRONG if changed else Tone.PLAIN
+    )
+
+
+def _alarms(floor: Floor) -> list[Block]:
+    told = [*floor.hall, *floor.alarms]
+    if not told:
+        return [Listing(["None."])]
+    columns = {
+        "Machine": lambda a: a.machine or f"hall (all of kind {a.model})",
+        "What": lambda a: named(a.parameter),
+        "Axis": lambda a: a.axis,
+        "Changed on": night_in_words,
+        "Size": size_in_words,
+        "Told after": lambda a: str(a.night),
+        "With it": lambda a: listed(a.others) if a.others else NOTHING,
+        "Diagnosed": lambda a: listed(floor.causes[a]) if floor.causes.get(a) else NOTHING,
+    }
+    caption = (
+        "Size: mean of the last nights less the mean before the change, with half its 90 % band. "
+        "Changed on: the most likely night, with its 90 % band."
+    )
+    return [TableBlock.of(told, columns, caption, tone=_tone)]
+
+
+def _tone(alarm: Alarm) -> Tone:
+    return Tone.STRONG if alarm.machine else Tone.PLAIN
+
+
+def _machines(floor: Floor) -> Block:
+    told = [m for m in floor.machines if any(m.attention)]
+    quiet = [m for m in floor.machines if not any(m.attention)]
+    columns = {
+        "Machine": lambda m: m.machine,
+        "Kind": lambda m: m.model or NOTHING,
+        "Attention for": state_in_words,
+        "Nights": lambda m: str(m.nights),
+        "Last night": lambda m: str(m.last or NOTHING),
+        "Force error / noise floor": lambda m: number(m.ratio, 2),
+        "Bad logs": lambda m: str(m.faulty),
+    }
+    shown = [*told[:MOST_ROWS], *quiet[:MOST_ROWS]]
+    left = len(floor.machines) - len(shown)
+    caption = f"{left} more machines are not shown; `twin fleet sql` has all." if left else ""
+    return TableBlock.of(
+        shown, columns, caption, tone=lambda m: Tone.STRONG if m.alarms else Tone.PLAIN
+    )
+
+
+def _machine(floor: Floor, state: MachineState) -> list[Block]:
+    said = [capitalised(alarm_in_words(a, floor.causes.get(a, ()))) for a in state.alarms]
+    said += [capitalised(off_in_words(off)) for off in state.off]
+    blocks: list[Block] = [Listing(said)] if said else []
+    courses = floor.courses[state.machine]
+    blocks.append(_parameters(courses))
+    told = {(a.axis, p) for a in state.alarms for p in (a.parameter, *a.others)}
+    first = [c for c in courses if (c.axis, c.parameter) in told]
+    rest = [c for c in courses if (c.axis, c.parameter) not in told]
+    for course in [*first, *(rest if first else rest[-1:])]:
+        alarms = [
+            a for a in state.alarms if (a.axis, a.parameter) == (course.axis, course.parameter)
+        ]
+        blocks.append(_chart(course, alarms))
+    return blocks
+
+
+def _parameters(courses: Sequence[Course]) -> Block:
+    columns = {
+        "Parameter": lambda c: f"{named(c.parameter)}, axis {c.axis}",
+        "First nights": lambda c: quantity(_mean(c.alone, slice(None, 5)), c.unit),
+        "Last nights": lambda c: quantity(_mean(c.alone, slice(-5, None)), c.unit),
+        "Its kind": lambda c: quantity(_mean(c.usual, slice(-5, None)), c.unit),
+        "Travelled in its logs": lambda c: f"{number(float(c.distance[-1]))} m",
+    }
+    return TableBlock.of(courses, columns)
+
+
+def _mean(values: Array, part: slice) -> float | None:
+    known = values[np.isfinite(values)][part]
+    return float(known.mean()) if len(known) else None
+
+
+def _chart(course: Course, alarms: Sequence[Alarm]) -> Block:
+    """A parameter over time: as fitted with its band, alone, and the level before and after."""
+    scale = DisplayUnit.of(course.unit, course.values)
+    nights = DAY * course.days
+    lines = []
+    if np.isfinite(course.half).any() and np.nanmax(course.half) > 0.0:
+        band = "90 % band within the log"
+        lines += [
+            Drawn(band, scale(course.values - course.half), Line.BAND),
+            Drawn(band, scale(course.values + course.half), Line.BAND),
+        ]
+    lines.append(Drawn("as fitted", scale(course.values), ink=Ink.SOFT))
+    if not np.array_equal(course.alone, course.values, equal_nan=True):
+        lines.append(Drawn("less what all machines do", scale(course.alone)))
+    lines.append(Drawn("median of its kind", scale(course.usual), Line.DASH, Ink.SOFT))
+    for alarm in alarms:
+        changed = (alarm.changed - date(1970, 1, 1)).days
+        level = np.where(course.days < changed, alarm.before, alarm.after)
+        lines.append(Drawn(f"level before and after {alarm.changed}", scale(level), ink=Ink.AFTER))
+    caption = capitalised(". ".join(change_in_words(a) for a in alarms)) if alarms else ""
+    return Chart(
+        ("Night", nights), scale.label(capitalised(named(course.parameter)).rstrip(".")), lines,
+        caption, dates=True,
+    )  # fmt: skip
