@@ -11,6 +11,7 @@ from typer import Argument, Option
 from identify.cli.command import Commands, Said, progress_on_stderr, tried
 from identify.cli.shared import Effects, app, written
 from twin.errors import InputError
+from twin.telling import heard
 
 fleet = Commands(
     help="Watch many machines: their logs over time, trends and alarms.", rich_markup_mode=None
@@ -18,6 +19,9 @@ fleet = Commands(
 app.add_typer(fleet, name="fleet")
 
 StoreOption = Annotated[Path, Option("--store", metavar="DIR", help="Folder of the records.")]
+Workers = Annotated[
+    int | None, Option(min=1, help="Processes on this computer; one a core if left out.")
+]
 
 
 @fleet.command()
@@ -47,9 +51,7 @@ def ingest(
             "out.",
         ),
     ] = None,
-    workers: Annotated[
-        int | None, Option(min=1, help="Processes on this computer; one a core if left out.")
-    ] = None,
+    workers: Workers = None,
     effects: Effects = None,
 ) -> Said:
     """Check and fit the logs of a folder that the store does not know yet, a record each.
@@ -133,6 +135,7 @@ def report(
     needed("duckdb")
     if (logs is None) != (model is None):
         raise InputError("--logs and --model: give both, or neither")
+    silent: list[str] = []
     with progress_on_stderr() as progress:
         progress("reading the records", 0, 1)
         floor = floor_of(Store.opened(store))
@@ -140,8 +143,35 @@ def report(
             from identify.fleet.cause import with_causes
             from identify.fleet.models import Models
 
-            floor = with_causes(floor, logs, Models.at(model, effects or ()), progress)
+            with heard() as silent:
+                floor = with_causes(floor, logs, Models.at(model, effects or ()), progress)
     failed = tried(lambda: write_fleet(html, floor)) if html else ()
     answer = FloorAnswer.of(floor, alarms=floor.alarms)
-    said = Said(floor_in_words(floor), answer, floor.faults, fine=not floor.alarms)
+    said = Said(floor_in_words(floor), answer, [*floor.faults, *silent], fine=not floor.alarms)
     return replace(said, unwritten=failed)
+
+
+@fleet.command()
+def demo(
+    folder: Annotated[Path, written("Folder to write into.")] = Path("fleet-demo"),
+    seed: Annotated[int, Option(help="Draws the machines and their nights.")] = 1,
+    machines: Annotated[int, Option(min=1, help="How many machines.")] = 20,
+    nights: Annotated[int, Option(min=1, help="How many nights.")] = 90,
+    workers: Workers = None,
+) -> Said:
+    """Draw a floor of machines of which three change, find these, and write one page.
+
+    Example: twin fleet demo -o fleet-demo
+    """
+    from identify.fleet.demo import demo as run
+    from identify.fleet.engine import needed
+    from identify.output.answers.fleet import FleetDemoAnswer
+    from identify.output.words.fleet import demo_in_words
+
+    needed("duckdb")
+    with progress_on_stderr() as progress, heard() as silent:
+        made = run(
+            folder, seed, machines=machines, nights=nights, workers=workers, progress=progress
+        )
+    text = demo_in_words(made.planted, made.floor, made.right, made.page)
+    return Said(text, FleetDemoAnswer.of(made), silent, fine=made.right)

@@ -20,6 +20,9 @@ from twin.signals import Array
 
 DEAD = 0.01  # of a parameter, below which a change is nobody's concern
 DEAD_ERROR = 0.25  # of the force error
+# Of a parameter that the hall's temperature may have moved, as neither other machines nor the logs
+# tell it: a year of 6 K at 1 % a kelvin, less what the scatter takes of it.
+DEAD_UNTOLD = 0.05
 LEAST_MACHINES = 5  # of which a median tells what all of them do
 FIRST_NIGHTS = 15  # whose median a machine is compared with
 LAST_NIGHTS = 5  # whose mean a machine has now
@@ -32,7 +35,8 @@ class Relative:
     """A panel relative to each machine's own first nights, with what all have in common taken off.
 
     own (m, n): of each machine alone, 1; common (n,): of all; zeros where they are too few.
-    deviations (m, n): 1. sizes (m,): in the panel's unit, what 1 is of each machine.
+    deviations (m, n): 1. sizes (m,): in the panel's unit, what 1 is of each machine,
+    from centres (m,). dead (m,): changes of each below which there is none, 1.
     """
 
     panel: Panel
@@ -41,15 +45,12 @@ class Relative:
     deviations: Array
     sizes: Array
     centres: Array
+    dead: Array
 
     @property
     def is_shared(self) -> bool:
         """Whether there are enough machines for what they have in common."""
         return bool(np.any(self.common))
-
-    @property
-    def dead(self) -> float:
-        return DEAD_ERROR if self.panel.parameter == FORCE_ERROR else DEAD
 
 
 def alarms_of(panels: Iterable[Panel]) -> tuple[Alarm, ...]:
@@ -81,9 +82,13 @@ def relative(panel: Panel) -> Relative:
     own = (values - centres[:, None]) / sizes[:, None]
     common = _common(own)
     own = own - common
-    if not np.any(common):
+    dead = np.full(len(own), DEAD)
+    if panel.parameter == FORCE_ERROR:
+        dead[:] = DEAD_ERROR
+    elif not np.any(common):
+        dead[~np.isfinite(panel.temperatures).any(axis=1)] = DEAD_UNTOLD
         own = np.stack([_less_warmth(x, t) for x, t in zip(own, panel.temperatures, strict=True)])
-    return Relative(panel, own, common, deviations / sizes[:, None], sizes, centres)
+    return Relative(panel, own, common, deviations / sizes[:, None], sizes, centres, dead)
 
 
 def _first(values: Array) -> Array:
@@ -102,9 +107,10 @@ def _common(own: Array) -> Array:
 
 
 def _less_warmth(values: Array, temperatures: Array) -> Array:
-    """A machine (n,) less what its own temperature (n,) K makes, where that is beyond chance.
+    """A machine (n,) less what its own temperature (n,) K makes.
 
-    By differences of neighbouring nights, which neither a step nor a trend takes part in.
+    By differences of neighbouring nights, which neither a step nor a trend takes part in; what
+    chance alone would make of the slope is taken off it (W. James, C. Stein, 1961).
     """
     warmer, change = np.diff(temperatures), np.diff(values)
     known = np.isfinite(warmer) & np.isfinite(change)
@@ -112,10 +118,8 @@ def _less_warmth(values: Array, temperatures: Array) -> Array:
         return values
     warmer, change = warmer[known], change[known]
     slope = warmer @ change / (warmer @ warmer)
-    error = np.sqrt(np.mean((change - slope * warmer) ** 2) / (warmer @ warmer))
-    beyond = 3.0  # standard deviations
-    if abs(slope) < beyond * error:
-        return values
+    chance = np.mean((change - slope * warmer) ** 2) / (warmer @ warmer)
+    slope *= max(1.0 - chance / max(slope**2, 1e-300), 0.0)
     return np.asarray(values - slope * (temperatures - np.nanmedian(temperatures)))
 
 
@@ -127,7 +131,8 @@ def _of_machines(shown: Relative, level: float) -> Iterator[Alarm]:
         known = np.flatnonzero(np.isfinite(shown.own[i]))
         values, variances = shown.own[i, known], shown.deviations[i, known] ** 2
         restore = _restored(shown, i)
-        for alarm in _chains(shown, values, variances, known, level, restore):
+        found = changes(values, variances, float(shown.dead[i]), level)
+        for alarm in _chains(shown, values, found, known, restore):
             yield replace(alarm, machine=machine, scope=Scope.MACHINE)
 
 
@@ -136,9 +141,8 @@ def _of_hall(shown: Relative, level: float) -> Iterator[Alarm]:
         return
     typical = int(np.argsort(np.abs(shown.centres))[len(shown.centres) // 2])
     nights = np.arange(len(shown.common))
-    yield from _chains(
-        shown, shown.common, np.zeros(len(nights)), nights, level, _restored(shown, typical)
-    )
+    found = changes(shown.common, np.zeros(len(nights)), float(shown.dead[typical]), level)
+    yield from _chains(shown, shown.common, found, nights, _restored(shown, typical))
 
 
 def _restored(shown: Relative, machine: int) -> Callable[[float], float]:
@@ -150,11 +154,10 @@ def _restored(shown: Relative, machine: int) -> Callable[[float], float]:
 
 
 def _chains(
-    shown: Relative, values: Array, variances: Array, nights: Array, level: float,
+    shown: Relative, values: Array, found: Sequence[Change], nights: Array,
     restore: Callable[[float], float],
 ) -> Iterator[Alarm]:  # fmt: skip
     """The alarms of a series; changes the same way, one behind the other, are one that grows."""
-    found = changes(values, variances, shown.dead, level)
     edges = [0, *(c.first for c in found), len(values)]
     means = [float(np.mean(values[a:b])) for a, b in pairwise(edges)]
     ups = [after > before for before, after in pairwise(means)]

@@ -26,6 +26,11 @@ HERE = Path(__file__).parent
 STAGE, FLOOR = HERE / "demo_stage.toml", HERE / "demo_floor.toml"
 
 
+def named(machine: int) -> str:
+    """What the machine of a number is called."""
+    return f"stage-{machine:02d}"
+
+
 @dataclass(frozen=True)
 class Scatter:
     """How a parameter differs: between machines, from night to night, each 1 RMS; 1/K of warmth."""
@@ -50,13 +55,18 @@ class Planted:
     nights: float = math.inf
     values: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """What its machine is called."""
+        return named(self.machine)
+
     def factor(self, night: int) -> float:
         """What the parameter is multiplied by on a night."""
         return 1.0 + self.grows * min(max(night - self.night + 1, 0), self.nights)
 
 
 @dataclass(frozen=True)
-class Floor:
+class Plan:
     """What happens on a floor of machines of one kind."""
 
     first_night: datetime
@@ -66,7 +76,7 @@ class Floor:
     planted: Sequence[Planted]
 
     @classmethod
-    def of(cls, path: Path = FLOOR) -> Floor:
+    def of(cls, path: Path = FLOOR) -> Plan:
         """That of a file."""
         given = tomllib.loads(path.read_text(encoding="utf-8"))
         return cls(
@@ -89,12 +99,12 @@ class Night:
     @property
     def name(self) -> str:
         """What the machine is called."""
-        return f"stage-{self.machine:02d}"
+        return named(self.machine)
 
 
 def nights_of(folder: Path, machines: int, nights: int, seed: int) -> Iterator[Night]:
     """The logs of a floor, night by night."""
-    warmer = temperatures(Floor.of().hall, nights, np.random.default_rng([seed, 0]))
+    warmer = temperatures(Plan.of().hall, nights, np.random.default_rng([seed, 0]))
     for night in range(nights):
         for machine in range(1, machines + 1):
             yield Night(folder, machine, night, float(warmer[night]), seed)
@@ -114,7 +124,7 @@ def temperatures(hall: Mapping[str, Any], nights: int, rng: np.random.Generator)
 
 def record_night(night: Night) -> None:
     """Run a machine as it is on a night, and write its log."""
-    floor = Floor.of()
+    floor = Plan.of()
     log = simulate(
         _as_it_is(night, floor), "tracking", seed=night.seed + 1000 * night.machine + night.night,
         duration=floor.duration, simulator=ReducedSimulator,
@@ -131,7 +141,7 @@ def _stage() -> MachineModel:
     return load_model(STAGE)
 
 
-def _as_it_is(night: Night, floor: Floor) -> MachineModel:
+def _as_it_is(night: Night, floor: Plan) -> MachineModel:
     """The machine with the values of a night."""
     model = _stage()
     (name, axis), *_ = model.axes.items()

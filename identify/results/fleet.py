@@ -148,3 +148,14 @@ class Floor:
     def alarms(self) -> tuple[Alarm, ...]:
         """Those of single machines."""
         return tuple(alarm for machine in self.machines for alarm in machine.alarms)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What changed on a machine, and on which night; of what was found by how much."""
+
+    machine: str
+    what: str
+    night: date
+    size: float | None = None
+    unit: str | None = None

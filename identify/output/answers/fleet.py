@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import date
 from typing import Any
 
-from identify.output.answers import Answer, Entry, File, Number
+from identify.output.answers import Answer, Entry, File, Number, read
 
 
 class IngestAnswer(Answer):
@@ -82,3 +82,28 @@ class FloorAnswer(Answer):
     alarms: list[AlarmEntry]
     hall: list[AlarmEntry]
     faults: list[str]
+
+
+class ToldEntry(Entry):
+    """What changed on a machine, and on which night."""
+
+    machine: str
+    what: str
+    night: date
+
+
+class FoundEntry(ToldEntry):
+    """The same as an alarm tells it."""
+
+    size: Number
+    unit: str | None
+
+
+class FleetDemoAnswer(Answer):
+    """What `twin fleet demo` prints: what was planted, and what was told."""
+
+    planted: list[ToldEntry]
+    alarms: list[FoundEntry]
+    hall: list[AlarmEntry] = read("floor.hall")
+    false_alarms: int
+    page: File

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from identify.output.numbers import NOTHING, listed, number, percent, quantity, with_band
-from identify.results.fleet import Alarm, Floor, Ingested, MachineState, Off
+from identify.results.fleet import Alarm, Floor, Ingested, MachineState, Off, Told
 
 
 def ingested_in_words(done: Ingested) -> str:
@@ -95,3 +96,10 @@ def floor_in_words(floor: Floor) -> str:
     count = len({a.machine for a in floor.alarms})
     head = f"{len(floor.machines)} machines, {count} of them changed"
     return "\n".join([head, *lines])
+
+
+def demo_in_words(planted: Sequence[Told], floor: Floor, right: bool, page: Path) -> str:
+    """What was planted, and what was told of it."""
+    lines = [f"planted: {p.what} on {p.machine}, from {p.night} on" for p in planted]
+    verdict = "all of it was found, and nothing else" if right else "not all that was told is right"
+    return "\n".join([*lines, floor_in_words(floor), verdict, f"page: {page}"])
