@@ -68,9 +68,10 @@ def drawn(machines: int, nights: int, rng: np.random.Generator, thermometer: flo
         factor += usual.scatter * rng.standard_normal((machines, nights))
         factor += usual.interval / 1.645 * rng.standard_normal((machines, nights))
         factor += RUN_IN * np.exp(-day / RUN_IN_NIGHTS) * (usual.warmth != 0.0)
+        within = np.broadcast_to(usual.interval / 1.645 * value, factor.shape)
         yield Panel(
             "stage", "x", name, usual.unit, tuple(f"stage-{i:04d}" for i in range(machines)),
-            FIRST_DAY + day, value * factor, np.broadcast_to(usual.interval / 1.645 * value, factor.shape),
+            FIRST_DAY + day, value * factor, within,
             293.0 + warm if thermometer else np.full(factor.shape, np.nan), np.ones(factor.shape),
         )  # fmt: skip
 

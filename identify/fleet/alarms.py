@@ -27,6 +27,7 @@ LEAST_MACHINES = 5  # of which a median tells what all of them do
 FIRST_NIGHTS = 15  # whose median a machine is compared with
 LAST_NIGHTS = 5  # whose mean a machine has now
 SMALL = 0.1  # of what is usual for the kind: a parameter below has no size of its own
+LEAST_TREND = 10  # nights since a change that tell whether it goes on
 APART = 2  # nights between bands of changes that are one all the same
 
 
@@ -184,17 +185,34 @@ def _alarm(
         changed=panel.night(nights[first.first]), earliest=panel.night(nights[first.earliest]),
         latest=panel.night(nights[first.latest]), before=low, after=high, size=high - low,
         half_width=scale, strength=max(c.strength for c in chain), scope=Scope.HALL,
-        steps=len(chain),
+        trend=_trend(values[edges[1] : edges[-1]], restore),
     )  # fmt: skip
+
+
+def _trend(values: Array, restore: Callable[[float], float]) -> float | None:
+    """How fast nights (n,) go on changing, by a line; None where that may be chance."""
+    if len(values) < LEAST_TREND:
+        return None
+    nights = np.arange(len(values)) - 0.5 * (len(values) - 1)
+    slope = float(nights @ values / (nights @ nights))
+    left = values - values.mean() - slope * nights
+    beyond = 4.0  # standard deviations
+    if abs(slope) < beyond * np.sqrt(left @ left / (len(left) - 2) / (nights @ nights)):
+        return None
+    last = float(values[-LAST_NIGHTS:].mean())
+    return restore(last + slope) - restore(last)
 
 
 # --- one change -----------------------------------------------------------------------------------
 
 
 def together(alarms: Sequence[Alarm]) -> list[Alarm]:
-    """One alarm of each change: parameters of an axis whose bands meet, led by the strongest."""
+    """One alarm of each change: parameters of an axis whose bands meet, led by the strongest.
+
+    Since the force error rose the model is wrong, and its parameters take over what it lacks.
+    """
     leading: list[Alarm] = []
-    for alarm in sorted(alarms, key=lambda a: -a.strength):
+    for alarm in sorted(alarms, key=lambda a: (not _is_wrong(a), -a.strength)):
         at = next((i for i, lead in enumerate(leading) if _meet(lead, alarm)), None)
         if at is None:
             leading.append(alarm)
@@ -204,6 +222,12 @@ def together(alarms: Sequence[Alarm]) -> list[Alarm]:
     return sorted(leading, key=lambda a: a.night)
 
 
-def _meet(one: Alarm, other: Alarm) -> bool:
-    gap = max(one.earliest, other.earliest) - min(one.latest, other.latest)
+def _is_wrong(alarm: Alarm) -> bool:
+    return alarm.parameter == FORCE_ERROR and alarm.size > 0.0
+
+
+def _meet(lead: Alarm, other: Alarm) -> bool:
+    if _is_wrong(lead) and other.latest >= lead.earliest:
+        return True
+    gap = max(lead.earliest, other.earliest) - min(lead.latest, other.latest)
     return gap.days <= APART

@@ -52,7 +52,10 @@ def nights_after(alarm: Alarm, contents: Contents) -> list[str]:
 def cause_of(
     alarm: Alarm, logs: Sequence[Path], models: Models, progress: Progress = silent
 ) -> tuple[str, ...]:
-    """The effects that a diagnosis of these logs names on the axis of an alarm. Raises InputError."""
+    """The effects that a diagnosis of these logs names on the axis of an alarm.
+
+    Raises InputError where they cannot be diagnosed.
+    """
     if len(logs) < LOGS:
         raise InputError(f"has {len(logs)} logs since {alarm.latest}; {LOGS} are needed")
     training, *others = ({str(path): path} for path in logs)

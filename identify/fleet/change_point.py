@@ -18,11 +18,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from twin.core.compiled import compiled
 from twin.signals import Array
 
-BEFORE, AFTER = 12, 3  # least nights before a change, and with it: one odd night is none
+BEFORE, AFTER = 12, 3  # least nights before a change, and with it
+ODD = (
+    6.0  # deviations from the nights before, to which one is taken: a single odd night is no change
+)
+REMEMBERED = 9  # nights, whose median an odd one is compared with
 MOST_ALIKE = 0.9  # of neighbouring nights, correlation
 
 
@@ -48,6 +53,7 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
     level: standard deviations of a normal distribution at which a change is told (``rates``).
     """
     out, begin = list[Change](), 0
+    values = without_odd(values, dead)
     limits = limits_at(level, len(values))
     while begin < len(values):
         told, scores = _first_change(values[begin:], variances[begin:], dead, limits)
@@ -61,6 +67,17 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
                    float(scores[best]))
         )  # fmt: skip
         begin += best
+    return out
+
+
+def without_odd(values: Array, dead: float) -> Array:
+    """A series (n,) none of whose nights is further from those before than a change needs."""
+    if len(values) <= REMEMBERED:
+        return values
+    scatter = 1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0)
+    usual = np.median(sliding_window_view(values, REMEMBERED), axis=1)[:-1]
+    out, far = values.copy(), ODD * scatter + dead
+    out[REMEMBERED:] = np.clip(values[REMEMBERED:], usual - far, usual + far)
     return out
 
 

@@ -72,9 +72,9 @@ ALARM = (
     Column("half_width", "DOUBLE", "unit", "of the 90 % band of size"),
     Column("strength", "DOUBLE", "1", "the size over its standard deviation, dead band taken off"),
     Column("scope", "VARCHAR", "", "machine, or hall: all of a kind changed at once"),
-    Column("steps", "BIGINT", "", "how often it changed that way by now: above 1 it grows"),
+    Column("trend", "DOUBLE", "unit a night", "how fast it goes on changing; null where it stays"),
     Column("others", "VARCHAR", "", "other parameters of the axis that changed with it"),
 )  # fmt: skip
-TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32", "BIGINT": "int64"}  # of Arrow
+TYPES = {"VARCHAR": "string", "DOUBLE": "float64", "DATE": "date32"}  # in Arrow
 RECORD = (Column("kind", "VARCHAR", "", "fit or finding"), *LOG, *FIT, *FINDING)
 VIEWS = {"fits": (*LOG, *FIT), "findings": (*LOG, *FINDING), "alarms": ALARM}

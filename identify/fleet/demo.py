@@ -27,7 +27,7 @@ LOGS, STORE, PAGE = "logs", "store", "fleet.html"
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """What was planted, and what was told of it. told: by alarm what it names, as planted things."""
+    """What was planted, and what the alarms name."""
 
     floor: Floor
     planted: tuple[Told, ...]

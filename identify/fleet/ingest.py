@@ -11,7 +11,7 @@ from identify.fleet.engine import engine, outcomes
 from identify.fleet.found_logs import Pattern, logs_below
 from identify.fleet.models import Models
 from identify.fleet.record import State, Task, record
-from identify.fleet.store import PACK_FROM, Store
+from identify.fleet.store import FEW, PACK_FROM, Store
 from identify.results.fleet import Ingested
 from twin.parallel import Progress, silent
 
@@ -48,7 +48,7 @@ def ingest(
                 store.pack()
                 unpacked = 0
             progress("ingesting", done, total)
-    store.pack()
+    store.pack(FEW)
     return Ingested(
         folder, store.root, total, states[State.FITTED], states[State.KNOWN],
         states[State.FAULTY], states[State.UNFINISHED], tuple(told),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from identify.fleet.alarms import alarms_of
 from identify.fleet.columns import ALARM
 from identify.fleet.engine import needed
-from identify.fleet.nights import panels
+from identify.fleet.nights import Panel, panels
 from identify.fleet.store import Contents, Store, parquet, table
 from identify.results.fleet import Alarm, Scope
 from twin.errors import Unwritten
@@ -20,12 +20,17 @@ RULES = b"1"  # grows when alarms are told by other rules
 MADE_OF = b"made_of"
 
 
-def alarms(store: Store, contents: Contents) -> tuple[Alarm, ...]:
-    """The alarms of a store: those that are kept, or new ones where its records are others."""
+def alarms(
+    store: Store, contents: Contents, every: Iterable[Panel] | None = None
+) -> tuple[Alarm, ...]:
+    """The alarms of a store: those that are kept, or new ones where its records are others.
+
+    every: its panels, where they are there.
+    """
     kept = _kept(store, contents)
     if kept is not None:
         return tuple(_read(row) for row in kept.to_pylist())
-    told = alarms_of(panels(contents))
+    told = alarms_of(panels(contents) if every is None else every)
     keep(store, contents, told)
     return told
 

@@ -22,9 +22,9 @@ CHOSEN = """
 CREATE TEMP TABLE chosen AS SELECT machine, model_sha256, version FROM (
   SELECT machine, model_sha256, version, row_number() OVER (
     PARTITION BY machine ORDER BY count(DISTINCT night) DESC, version DESC, model_sha256) AS place
-  FROM fits GROUP BY ALL) WHERE place = 1
+  FROM fits GROUP BY machine, model_sha256, version) WHERE place = 1
 """
-# A night may have several logs; a fit without its spread is weighed as the others are.
+# A night may have several logs. One that does not tell a parameter has a value without a spread.
 NIGHTLY = """
 CREATE TEMP TABLE nightly AS
 SELECT model, axis, parameter, any_value(unit) AS unit, machine,
@@ -32,7 +32,7 @@ SELECT model, axis, parameter, any_value(unit) AS unit, machine,
        avg(temperature) AS temperature, sum(distance) AS distance
 FROM (
   SELECT model, axis, parameter, unit, machine, model_sha256, version, night, value, spread,
-         temperature, distance FROM fits
+         temperature, distance FROM fits WHERE spread IS NOT NULL
   UNION ALL
   SELECT DISTINCT model, axis, 'force_error', force_unit, machine, model_sha256, version, night,
          error, NULL, temperature, distance FROM fits)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from datetime import date
 
 import numpy as np
@@ -45,7 +44,7 @@ def floor_of(
     """
     contents = store.contents()
     every = list(panels(contents))
-    told = alarms(store, contents)
+    told = alarms(store, contents, every)
     states = _states(contents, told, tuple(off(every)))
     ranked = sorted(states, key=lambda s: (*(-x for x in s.attention), s.machine))
     shown = {state.machine for state in ranked[:drawn]}
@@ -56,7 +55,7 @@ def floor_of(
 
 
 def _states(contents: Contents, told: Sequence[Alarm], apart: Sequence[Off]) -> list[MachineState]:
-    with closing(connected(contents)) as base:
+    with connected(contents) as base:
         counts = base.execute(COUNTS).fetchall()
         ratios = dict(base.execute(RATIOS).fetchall())
     return [

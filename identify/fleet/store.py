@@ -22,7 +22,8 @@ from twin.errors import InputError
 from twin.files import make_folder, write_atomically
 
 NAME = re.compile(r"[0-9a-f]{64}\.parquet")  # of a record: its key
-PACK_FROM = 1000  # records from which they are packed: each is a file to open
+PACK_FROM = 1000  # records from which they are packed while more are made: each is a file to open
+FEW = 50  # that are left as they are in the end
 Row = Mapping[str, Any]
 
 

@@ -15,7 +15,8 @@ KINDS = {"fits": "fit", "findings": "finding"}
 
 def connected(contents: Contents) -> Any:
     """A connection with the views fits and findings of files that were found good."""
-    base = needed("duckdb").connect(config={"threads": 2})
+    base = needed("duckdb").connect()
+    base.execute("SET enable_progress_bar = false")
     source = _rows_of(base, contents)
     for view, kind in KINDS.items():
         names = ", ".join(c.name for c in VIEWS[view])

@@ -42,7 +42,8 @@ class Alarm:
     machine: None where all of the kind changed. night: after which it was told; changed: the first
     night of it, with the ends of its 90 % band. before, after: means; size: their difference, with
     half the width of its 90 % band. strength: size beyond the dead band over its standard
-    deviation. steps: how often it changed that way by now. others: parameters that changed with it.
+    deviation. trend: how fast it goes on, unit a night; None where it stays. others: parameters
+    that changed with it.
     """
 
     machine: str | None
@@ -60,7 +61,7 @@ class Alarm:
     half_width: float
     strength: float
     scope: Scope
-    steps: int = 1
+    trend: float | None = None
     others: tuple[str, ...] = ()
 
     @property

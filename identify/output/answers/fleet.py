@@ -47,7 +47,7 @@ class AlarmEntry(Entry):
     after: Number
     size: Number
     half_width: Number
-    steps: int
+    trend: Number
     others: list[str]
 
 

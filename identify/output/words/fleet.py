@@ -48,12 +48,12 @@ def size_in_words(alarm: Alarm) -> str:
 
 def change_in_words(alarm: Alarm) -> str:
     """What changed, by how much and since when."""
-    what, verb = named(alarm.parameter), "grows" if alarm.size > 0 else "falls"
-    verb = verb if alarm.steps > 1 else "rose" if alarm.size > 0 else "fell"
-    since = "since" if alarm.steps > 1 else "on"
+    what, verb = named(alarm.parameter), "rose" if alarm.size > 0 else "fell"
     before, after = (quantity(v, alarm.unit) for v in (alarm.before, alarm.after))
-    said = f"{what} of axis {alarm.axis} {verb} {since} {night_in_words(alarm)}: "
+    said = f"{what} of axis {alarm.axis} {verb} on {night_in_words(alarm)}: "
     said += f"{size_in_words(alarm)}, from {before} to {after}"
+    if alarm.trend is not None:
+        said += f", and goes on by {quantity(alarm.trend, alarm.unit)} a night"
     return said + (f"; with it changed {listed(alarm.others)}" if alarm.others else "")
 
 
