@@ -18,8 +18,8 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "rules", "dataset", "estimation", "analysis", "frequency", "selection", "mechanism",
-    "validation", "experiment_design", "results", "output", "workflow", "adding", "view", "testing",
-    "demo", "cli", "start",
+    "validation", "experiment_design", "results", "output", "workflow", "adding", "fleet", "view",
+    "testing", "demo", "cli", "start",
 )  # fmt: skip
 TWIN_ROOMS = (
     "errors", "files", "entries", "numbers", "signals", "telling", "threads", "parallel",
@@ -164,6 +164,12 @@ def test_signals_are_differentiated_and_smoothed_in_one_file() -> None:
     for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:
         own = ONE_OF_EACH.search(path.read_text())
         assert not own or path == TWIN / "signals.py", f"{path}: {own} is in twin/signals.py"
+
+
+def test_nothing_below_a_fleet_knows_of_it(arrows) -> None:
+    """One log and one machine need neither a store nor an engine."""
+    using = {name for name, used in arrows.items() if any(room(u) == "fleet" for u in used)}
+    assert {room(name) for name in using} <= {"fleet", "cli"}
 
 
 def test_sentences_about_results_are_made_in_output_alone() -> None:

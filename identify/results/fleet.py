@@ -102,6 +102,11 @@ class Course:
     half: Array
     usual: Array
 
+    @property
+    def distance_unit(self) -> str:
+        """That of the axis, whose torques are in N m where it is rotary."""
+        return "rad" if "N m" in self.unit or "kg m" in self.unit else "m"
+
 
 @dataclass(frozen=True)
 class MachineState:

@@ -141,15 +141,24 @@ def _machine(floor: Floor, state: MachineState) -> list[Block]:
     blocks: list[Block] = [Listing(said)] if said else []
     courses = floor.courses[state.machine]
     blocks.append(_parameters(courses))
-    told = {(a.axis, p) for a in state.alarms for p in (a.parameter, *a.others)}
-    first = [c for c in courses if (c.axis, c.parameter) in told]
-    rest = [c for c in courses if (c.axis, c.parameter) not in told]
-    for course in [*first, *(rest if first else rest[-1:])]:
-        alarms = [
-            a for a in state.alarms if (a.axis, a.parameter) == (course.axis, course.parameter)
-        ]
-        blocks.append(_chart(course, alarms))
+    for course in _ordered(state, courses):
+        told = [a for a in state.alarms if (a.axis, a.parameter) == (course.axis, course.parameter)]
+        caption = capitalised(". ".join(change_in_words(a) for a in told)) if told else ""
+        lines = _lines(course, told)
+        over_time = ("Night (month-day)", DAY * course.days)
+        blocks.append(Chart(over_time, _label(course), lines, caption, dates=True))
+        if told:
+            over_distance = (f"Travelled in its logs ({course.distance_unit})", course.distance)
+            blocks.append(Chart(over_distance, _label(course), lines))
     return blocks
+
+
+def _ordered(state: MachineState, courses: Sequence[Course]) -> list[Course]:
+    """What changed first, the strongest of it before all; of a machine that is well the error."""
+    names = [(a.axis, p) for a in state.alarms for p in (a.parameter, *a.others)]
+    first = [c for name in dict.fromkeys(names) for c in courses if (c.axis, c.parameter) == name]
+    rest = [c for c in courses if (c.axis, c.parameter) not in names]
+    return [*first, *rest] if first else rest[-1:]
 
 
 def _parameters(courses: Sequence[Course]) -> Block:
@@ -158,7 +167,7 @@ def _parameters(courses: Sequence[Course]) -> Block:
         "First nights": lambda c: quantity(_mean(c.alone, slice(None, 5)), c.unit),
         "Last nights": lambda c: quantity(_mean(c.alone, slice(-5, None)), c.unit),
         "Its kind": lambda c: quantity(_mean(c.usual, slice(-5, None)), c.unit),
-        "Travelled in its logs": lambda c: f"{number(float(c.distance[-1]))} m",
+        "Travelled in its logs": lambda c: quantity(float(c.distance[-1]), c.distance_unit),
     }
     return TableBlock.of(courses, columns)
 
@@ -168,17 +177,21 @@ def _mean(values: Array, part: slice) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _chart(course: Course, alarms: Sequence[Alarm]) -> Block:
-    """A parameter over time: as fitted with its band, alone, and the level before and after."""
+def _label(course: Course) -> str:
     scale = DisplayUnit.of(course.unit, course.values)
-    nights = DAY * course.days
+    return scale.label(capitalised(named(course.parameter)).rstrip("."))
+
+
+def _lines(course: Course, alarms: Sequence[Alarm]) -> list[Drawn]:
+    """A parameter as fitted with its band, alone, and the level before and after each alarm."""
+    scale = DisplayUnit.of(course.unit, course.values)
+    low, high = np.nanmin(course.values), np.nanmax(course.values)
+    within = np.clip(course.half, 0.0, high - low)  # else one night would leave nothing to be seen
     lines = []
-    if np.isfinite(course.half).any() and np.nanmax(course.half) > 0.0:
+    if np.isfinite(within).any() and np.nanmax(within) > 0.0:
         band = "90 % band within the log"
-        lines += [
-            Drawn(band, scale(course.values - course.half), Line.BAND),
-            Drawn(band, scale(course.values + course.half), Line.BAND),
-        ]
+        edges = (course.values + within, course.values - within)
+        lines += [Drawn(band, scale(edge), Line.BAND) for edge in edges]
     lines.append(Drawn("as fitted", scale(course.values), ink=Ink.SOFT))
     if not np.array_equal(course.alone, course.values, equal_nan=True):
         lines.append(Drawn("less what all machines do", scale(course.alone)))
@@ -187,8 +200,4 @@ def _chart(course: Course, alarms: Sequence[Alarm]) -> Block:
         changed = (alarm.changed - date(1970, 1, 1)).days
         level = np.where(course.days < changed, alarm.before, alarm.after)
         lines.append(Drawn(f"level before and after {alarm.changed}", scale(level), ink=Ink.AFTER))
-    caption = capitalised(". ".join(change_in_words(a) for a in alarms)) if alarms else ""
-    return Chart(
-        ("Night", nights), scale.label(capitalised(named(course.parameter)).rstrip(".")), lines,
-        caption, dates=True,
-    )  # fmt: skip
+    return lines

@@ -38,7 +38,7 @@ function plot(place, options, values) {
   const u = new uPlot({
     width: Math.max(place.clientWidth, 200), pxAlign: false, ...options, series: [options.x, ...options.series],
     scales: {x: {time: false}, ...options.scales},
-    axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null})}), axis(options.labels[1], {size: 62})],
+    axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null}), ...(options.days ? {values: options.days} : {})}), axis(options.labels[1], {size: 62})],
   }, values, place);
   if (!place.watch) {
     place.watch = new ResizeObserver(() => place.shown.setSize({width: Math.max(place.clientWidth, 200), height: place.shown.height}));
@@ -335,7 +335,7 @@ for (const place of document.querySelectorAll("[data-chart]")) {
   const log = on => on ? {distr: 3} : {}, day = v => v == null ? "–" : new Date(v * 1e3).toISOString().slice(0, 10);
   plot(place, {
     height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => spec.x.dates ? day(v) : digits(v)},
-    tzDate: v => uPlot.tzDate(new Date(v * 1e3), "Etc/UTC"),
+    ...(spec.x.dates ? {days: (u, at) => at.map(v => day(v).slice(5))} : {}), tzDate: v => uPlot.tzDate(new Date(v * 1e3), "Etc/UTC"),
     scales: {x: {time: spec.x.dates, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
     series: spec.series.map(s => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind], width: s.kind === "band" ? 0.5 : 1.5})),
     cursor: {drag: {x: true, y: false}},
