@@ -31,7 +31,7 @@ def here(*_: object, **__: object) -> Iterator[tuple[Executor, int]]:
 def ingested(folder: Path, store: Path, **more: object) -> Ingested:
     """Ingest a folder without another process."""
     with patch("identify.fleet.ingest.engine", here):
-        return ingest(folder, Store.made(store), MODELS, **more)
+        return ingest(folder, store, MODELS, **more)
 
 
 def recorded(folder: Path, machines: int, nights: int) -> Path:

@@ -62,7 +62,6 @@ def ingest(
     from identify.fleet.found_logs import Pattern
     from identify.fleet.ingest import ingest as run
     from identify.fleet.models import Models
-    from identify.fleet.store import Store
     from identify.output.answers.fleet import IngestAnswer
     from identify.output.words.fleet import ingested_in_words
 
@@ -71,7 +70,7 @@ def ingest(
     read = None if pattern is None else Pattern(pattern)
     with progress_on_stderr() as progress:
         done = run(
-            logs, Store.made(store), known, pattern=read, scheduler=scheduler, workers=workers,
+            logs, store, known, pattern=read, scheduler=scheduler, workers=workers,
             progress=progress,
         )  # fmt: skip
     return Said(ingested_in_words(done), IngestAnswer.of(done), done.told)

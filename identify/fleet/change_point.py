@@ -27,7 +27,8 @@ BEFORE, AFTER = 12, 3  # least nights before a change, and with it
 ODD = (
     6.0  # deviations from the nights before, to which one is taken: a single odd night is no change
 )
-REMEMBERED = 9  # nights, whose median an odd one is compared with
+NEIGHBOURS = 9  # nights, whose median an odd one is compared with
+LATER = 10  # nights after it was told that take part in its date
 MOST_ALIKE = 0.9  # of neighbouring nights, correlation
 
 
@@ -53,12 +54,11 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
     level: standard deviations of a normal distribution at which a change is told (``rates``).
     """
     out, begin = list[Change](), 0
-    values = without_odd(values, dead)
+    asked, dated = (without_odd(values, dead, n) for n in (0, NEIGHBOURS // 2 + 1))
     limits = limits_at(level, len(values))
-    while begin < len(values):
-        told, scores = _first_change(values[begin:], variances[begin:], dead, limits)
-        if told < 0:
-            break
+    while (told := _told(asked[begin:], variances[begin:], dead, limits)) >= 0:
+        known = slice(begin, begin + told + 1 + LATER)
+        scores = _scores(dated[known], variances[known], dead)
         best = int(np.argmax(scores))
         weights = np.cumsum(np.exp(0.5 * (scores**2 - scores[best] ** 2)) * (scores > 0.0))
         low, high = np.searchsorted(weights, np.array([0.05, 0.95]) * weights[-1])
@@ -70,14 +70,20 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
     return out
 
 
-def without_odd(values: Array, dead: float) -> Array:
-    """A series (n,) none of whose nights is further from those before than a change needs."""
-    if len(values) <= REMEMBERED:
+def without_odd(values: Array, dead: float, later: int = 0) -> Array:
+    """A series (n,) none of whose nights is further from its neighbours than a change needs.
+
+    Of these the last is so many nights later: none, as long as it is asked whether there is one.
+    """
+    scatter = 1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0) if len(values) > 1 else 0.0
+    if len(values) <= NEIGHBOURS or scatter == 0.0:
         return values
-    scatter = 1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0)
-    usual = np.median(sliding_window_view(values, REMEMBERED), axis=1)[:-1]
-    out, far = values.copy(), ODD * scatter + dead
-    out[REMEMBERED:] = np.clip(values[REMEMBERED:], usual - far, usual + far)
+    usual = np.median(sliding_window_view(values, NEIGHBOURS), axis=1)
+    first = NEIGHBOURS - later  # the first night that has all of them
+    nights, far = slice(first, first + len(usual) - (later == 0)), ODD * scatter + dead
+    usual = usual[: nights.stop - nights.start]
+    out = values.copy()
+    out[nights] = np.clip(values[nights], usual - far, usual + far)
     return out
 
 
@@ -94,39 +100,57 @@ def limits_at(level: float, count: int) -> Array:
 
 
 @compiled(nogil=True)
-def _first_change(x, variances, dead, limits):
-    """After which night a change is told (-1: none), and the statistic of each as its first."""
-    n_all = len(x)
-    scores = np.zeros(n_all)
-    root, w = np.empty(n_all), np.empty(n_all)
-    sums = np.zeros((6, n_all + 1))
-    jumps = 0.0  # sum of squared differences of neighbours, less what their intervals make
-    for n in range(1, n_all + 1):
+def _told(x, variances, dead, limits):
+    """After which night a change is told; -1: none is."""
+    sums = np.zeros((6, len(x) + 1))
+    jumps = 0.0
+    for n in range(1, len(x) + 1):
         if n > 1:
-            jumps += 0.5 * ((x[n - 1] - x[n - 2]) ** 2 - variances[n - 1] - variances[n - 2])
-        if n < BEFORE + AFTER:
-            continue
-        scatter = max(jumps / (n - 1), 1e-3 * variances[:n].mean() + 1e-300)
-        for i in range(n):
-            w[i] = 1.0 / (variances[i] + scatter)
-            root[i] = np.sqrt(w[i])
-            y = x[i] - x[0]
-            before = x[i - 1] - x[0] if i else 0.0
-            both = root[i] * root[i - 1] if i else 0.0
-            sums[0, i + 1] = sums[0, i] + w[i]
-            sums[1, i + 1] = sums[1, i] + w[i] * y
-            sums[2, i + 1] = sums[2, i] + w[i] * y * y
-            sums[3, i + 1] = sums[3, i] + both
-            sums[4, i + 1] = sums[4, i] + both * (y + before)
-            sums[5, i + 1] = sums[5, i] + both * y * before
-        best = 0.0
-        for k in range(BEFORE, n - AFTER + 1):
-            scores[k] = _score(sums, k, n, dead)
-            best = max(best, scores[k])
-        if best > limits[n]:
-            scores[n - AFTER + 1 :] = 0.0
-            return n - 1, scores[:n]
-    return -1, scores
+            jumps += _jump(x, variances, n - 1)
+        if n >= BEFORE + AFTER:
+            _add_up(x, variances, n, jumps, sums)
+            for k in range(BEFORE, n - AFTER + 1):
+                if _score(sums, k, n, dead) > limits[n]:
+                    return n - 1
+    return -1
+
+
+@compiled(nogil=True)
+def _scores(x, variances, dead):
+    """The statistic of each night (n,) as the first of a change."""
+    n = len(x)
+    sums, scores = np.zeros((6, n + 1)), np.zeros(n)
+    jumps = 0.0
+    for i in range(1, n):
+        jumps += _jump(x, variances, i)
+    _add_up(x, variances, n, jumps, sums)
+    for k in range(BEFORE, n):
+        scores[k] = _score(sums, k, n, dead)
+    return scores
+
+
+@compiled(nogil=True)
+def _jump(x, variances, i):
+    """What two neighbours tell of the variance between nights, less that within them."""
+    return 0.5 * ((x[i] - x[i - 1]) ** 2 - variances[i] - variances[i - 1])
+
+
+@compiled(nogil=True)
+def _add_up(x, variances, n, jumps, sums):
+    """Weights, weighted values and products of neighbours of n nights, each added up."""
+    scatter = max(jumps / (n - 1), 1e-3 * variances[:n].mean() + 1e-300)
+    root, last = 0.0, 0.0  # of the night before
+    for i in range(n):
+        w = 1.0 / (variances[i] + scatter)
+        y = x[i] - x[0]
+        both = np.sqrt(w) * root
+        sums[0, i + 1] = sums[0, i] + w
+        sums[1, i + 1] = sums[1, i] + w * y
+        sums[2, i + 1] = sums[2, i] + w * y * y
+        sums[3, i + 1] = sums[3, i] + both
+        sums[4, i + 1] = sums[4, i] + both * (y + last)
+        sums[5, i + 1] = sums[5, i] + both * y * last
+        root, last = np.sqrt(w), y
 
 
 @compiled(nogil=True)

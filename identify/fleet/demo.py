@@ -73,7 +73,7 @@ def demo(
         made = outcomes(executor, count, record_night, nights_of(logs, machines, nights, seed))
         for done, _ in enumerate(made, start=1):
             progress("simulating nights", done, total)
-    ingest(logs, Store.made(store), models, workers=workers, progress=progress)
+    ingest(logs, store, models, workers=workers, progress=progress)
     floor = with_causes(floor_of(Store.opened(store)), logs, models, progress)
     write_fleet(page, floor)
     planted = [p for p in plan.planted if p.machine <= machines and p.night < nights]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from identify.fleet.engine import engine, outcomes
@@ -20,7 +19,7 @@ MOST_TOLD = 20  # bad logs that are told line by line; all of them are in `findi
 
 def ingest(
     folder: Path,
-    store: Store,
+    root: Path,
     models: Models,
     *,
     pattern: Pattern | None = None,
@@ -30,11 +29,13 @@ def ingest(
 ) -> Ingested:
     """Make the records of all logs below a folder that are not in the store yet.
 
-    scheduler: address of a Dask scheduler, whose workers see the same folders; None: workers of
-    this computer, one a core. Raises InputError where the folder, the store or the workers fail.
+    root: of the store, which is made where it is not there. scheduler: address of a Dask scheduler,
+    whose workers see the same folders; None: workers of this computer, one a core. Raises
+    InputError where the folder, the store or the workers fail.
     """
-    folder, store = folder.resolve(), replace(store, root=store.root.resolve())
+    folder = folder.resolve()
     total = sum(1 for _ in logs_below(folder))
+    store = Store.made(root.resolve())
     tasks = _tasks(folder, store, models, pattern)
     states, told, unpacked = Counter[State](), list[str](), 0
     progress("ingesting", 0, total)
