@@ -22,7 +22,7 @@ MEASURED = (
     "simulation", "starts", "peer_fits", "diagnosis", "passes", "kinds", "stages",
     "mcap_logs", "effect_cost", "emps", "joints", "arms", "recordings", "withheld", "tx40",
     "foreign", "drives", "roles", "presliding", "silence", "thesis", "selftest", "export", "frf",
-    "rule", "fuzz", "door", "sound", "mutation", "size", "held",
+    "rule", "fuzz", "door", "sound", "fleet", "mutation", "size", "held",
 )  # fmt: skip
 # What takes options, or half an hour, by its name alone, and the module.
 RUNS = {

@@ -153,7 +153,7 @@ def _held(part: Path) -> BinaryIO:
     while True:
         stream = open(part, "ab")
         try:
-            _lock(stream)
+            lock(stream)
             if os.path.samestat(os.stat(part), os.fstat(stream.fileno())):
                 return stream
         except FileNotFoundError:
@@ -192,7 +192,7 @@ def _checked(path: Path) -> Path:
     for part in target.parent.glob(f".*{PART}"):
         if part not in _unfinished:
             with suppress(OSError), open(part, "r+b") as stream:
-                _lock(stream)
+                lock(stream)
                 part.unlink()
     return target
 
@@ -219,7 +219,7 @@ def _is_direct(path: Path) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def _lock(stream: BinaryIO) -> None:
+def lock(stream: BinaryIO) -> None:
     """Hold the file until it is closed; raises OSError where another process does."""
     if sys.platform != "win32":  # there an open file cannot be removed
         import fcntl

@@ -174,3 +174,41 @@ def demo(
         )
     text = demo_in_words(made.planted, made.floor, made.right, made.page)
     return Said(text, FleetDemoAnswer.of(made), silent, fine=made.right)
+
+
+@fleet.command()
+def kind(
+    model: Annotated[str, Argument(metavar="MODEL", help="Model (.toml) of the kind.")],
+    store: StoreOption,
+    machine: Annotated[
+        str | None, Option(help="Machine whose own logs take part; a new one if left out.")
+    ] = None,
+    out: Annotated[Path | None, written("Model to write, with the values expected.")] = None,
+    effects: Effects = None,
+) -> Said:
+    """Tell how the machines of a kind differ, and what is to be expected of a new one.
+
+    Example: twin fleet kind stage.toml --store fleet -o new_stage.toml
+    """
+    from identify.cli.shared import loaded
+    from identify.fleet.engine import needed
+    from identify.fleet.kind import FEWEST, begun, kinds
+    from identify.fleet.nights import panels
+    from identify.fleet.store import Store
+    from identify.output.answers.fleet import KindAnswer
+    from identify.output.words.fleet import kind_in_words
+    from twin.model.file import save_model
+
+    needed("duckdb")
+    given, _ = loaded(model, effects)
+    contents = Store.opened(store).contents()
+    told = tuple(kinds(panels(contents), given.name, machine))
+    if not told:
+        raise InputError(
+            f"{model}: the store has fewer than {FEWEST} machines of kind '{given.name}'; a kind "
+            "is told by that many"
+        )
+    failed = tried(lambda: save_model(begun(given, told), out)) if out else ()
+    answer = KindAnswer.of(kind=given.name, machine=machine, parameters=list(told), model=out)
+    said = Said(kind_in_words(given.name, told, machine), answer, contents.faults)
+    return replace(said, unwritten=failed)

@@ -13,7 +13,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from identify.fleet.change_point import Change, changes
-from identify.fleet.nights import FORCE_ERROR, TO_DEVIATION, Panel
+from identify.fleet.nights import FORCE_ERROR, TO_DEVIATION, Panel, median
 from identify.fleet.rates import level_of
 from identify.results.fleet import Alarm, Scope
 from twin.signals import Array
@@ -95,7 +95,7 @@ def relative(panel: Panel) -> Relative:
 def _first(values: Array) -> Array:
     """Of each machine (m, n) the median of the first nights that it has, (m,)."""
     known = np.cumsum(np.isfinite(values), axis=1)
-    return np.nanmedian(np.where(known <= FIRST_NIGHTS, values, np.nan), axis=1)
+    return median(np.where(known <= FIRST_NIGHTS, values, np.nan), axis=1)
 
 
 def _common(own: Array) -> Array:
@@ -104,7 +104,7 @@ def _common(own: Array) -> Array:
     if not enough.any():
         return np.zeros(own.shape[1])
     nights = np.arange(own.shape[1])
-    return np.interp(nights, nights[enough], np.nanmedian(own[:, enough], axis=0))
+    return np.interp(nights, nights[enough], median(own[:, enough], axis=0))
 
 
 def _less_warmth(values: Array, temperatures: Array) -> Array:

@@ -8,6 +8,7 @@ grows with their number.
 from __future__ import annotations
 
 import importlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -36,6 +37,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 AHEAD = 4  # tasks a worker has waiting, so that none stands still while an answer travels
 TIMEOUT = 10.0  # s for a scheduler to answer
+RETRIES = 3  # of a task whose worker was lost
 
 
 def needed(module: str) -> ModuleType:
@@ -67,7 +69,7 @@ def outcomes(
             ended, running = wait(running, return_when=FIRST_COMPLETED)
             for one in ended:
                 yield one.result()
-    except (BrokenExecutor, CancelledError) as error:
+    except BrokenExecutor as error:
         raise InputError(
             "a worker was lost, by a lack of memory or from outside; what was done is in the "
             "store: give the same command again"
@@ -91,6 +93,7 @@ def local(workers: int | None = None) -> Iterator[tuple[Executor, int]]:
 def cluster(address: str) -> Iterator[tuple[Executor, int]]:
     """The workers of a Dask scheduler. Raises InputError where none answers or it is lost."""
     distributed = needed("distributed")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is told below
     try:
         client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
@@ -105,8 +108,13 @@ def cluster(address: str) -> Iterator[tuple[Executor, int]]:
                 f"--scheduler {address}: has no workers; start them with `dask worker {address} "
                 "--nthreads 1`"
             )
-        yield client.get_executor(retries=3), count
-    except (OSError, TimeoutError) as error:
+        yield client.get_executor(retries=RETRIES), count
+    except distributed.KilledWorker as error:
+        raise InputError(
+            f"--scheduler {address}: a log has ended several workers, by a lack of memory or from "
+            "outside; what was done is in the store: give the workers more memory"
+        ) from error
+    except (OSError, TimeoutError, CancelledError) as error:
         raise InputError(
             f"--scheduler {address}: was lost; what was done is in the store: start it and give "
             "the same command again"

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
-from identify.fleet.alarms import alarms_of
 from identify.fleet.columns import ALARM
 from identify.fleet.engine import needed
 from identify.fleet.nights import Panel, panels
@@ -30,6 +29,8 @@ def alarms(
     kept = _kept(store, contents)
     if kept is not None:
         return tuple(_read(row) for row in kept.to_pylist())
+    from identify.fleet.alarms import alarms_of  # numba takes longer to load than a question
+
     told = alarms_of(panels(contents) if every is None else every)
     keep(store, contents, told)
     return told

@@ -8,15 +8,15 @@ What is known of a new machine is that, drawn to its own logs as these grow.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from identify.fleet.alarms import LAST_NIGHTS
 from identify.fleet.nights import FORCE_ERROR, Panel
-from identify.results.fleet import Off
-from twin.model.machine import AxisModel, MachineModel
+from identify.results.fleet import KindParameter, Off
+from twin.model.machine import MachineModel
 from twin.model.parameters import all_parameters, write
 from twin.signals import Array
 
@@ -52,15 +52,19 @@ def kind_of(values: Array, deviations: Array) -> Kind:
 def levels(panel: Panel) -> tuple[Array, Array]:
     """Where each machine stands now (m,), and the standard deviation of that (m,).
 
-    Of its last nights, which scatter as all of its neighbouring nights do.
+    Of its last nights, each of which weighs by its own interval and by what nights scatter.
     """
-    last = [row[np.isfinite(row)][-LAST_NIGHTS:] for row in panel.values]
-    means = np.array([row.mean() for row in last])
-    steps = [np.diff(row[np.isfinite(row)]) for row in panel.values]
-    usual = np.median([np.std(s) / np.sqrt(2.0) for s in steps if len(s) > 1] or [0.0])
-    within = np.nanmean(panel.deviations) if np.isfinite(panel.deviations).any() else 0.0
-    nights = np.array([len(row) for row in last])
-    return means, np.maximum(usual, within) / np.sqrt(nights)
+    known = [np.flatnonzero(np.isfinite(row)) for row in panel.values]
+    steps = [np.diff(row[at]) for row, at in zip(panel.values, known, strict=True) if len(at) > 2]
+    scatter = np.median([1.4826 * np.median(np.abs(s)) / np.sqrt(2.0) for s in steps] or [0.0])
+    within = np.nan_to_num(panel.deviations)
+    floor = max(scatter**2, 1e-18 * np.nanmax(np.abs(panel.values)) ** 2)
+    out = np.empty((2, len(known)))
+    for i, at in enumerate(known):
+        last = at[-LAST_NIGHTS:]
+        weights = 1.0 / (within[i, last] ** 2 + floor)
+        out[:, i] = weights @ panel.values[i, last] / weights.sum(), weights.sum() ** -0.5
+    return out[0], out[1]
 
 
 def off(panels: Iterable[Panel]) -> Iterator[Off]:
@@ -83,38 +87,35 @@ def off(panels: Iterable[Panel]) -> Iterator[Off]:
                       float(far[i]))  # fmt: skip
 
 
-def expected(
+def kinds(
     panels: Iterable[Panel], kind: str, machine: str | None = None
-) -> Mapping[tuple[str, str], tuple[float, float]]:
-    """By axis and parameter what a machine of a kind is, and its standard deviation.
+) -> Iterator[KindParameter]:
+    """What a kind is, parameter by parameter, and what is expected of a machine of it.
 
-    machine: one whose own logs take part; None: one that has none yet.
+    machine: whose own logs take part; None: one that has none yet. A parameter of fewer than
+    ``FEWEST`` other machines is left out.
     """
-    found = {}
     for panel in panels:
-        own = list(panel.machines).index(machine) if machine in panel.machines else None
-        if panel.kind != kind or panel.parameter == FORCE_ERROR or len(panel.machines) < FEWEST:
+        if panel.kind != kind or panel.parameter == FORCE_ERROR:
             continue
         values, deviations = levels(panel)
-        others = np.arange(len(values)) != own
-        known = kind_of(values[others], deviations[others])
-        found[panel.axis, panel.parameter] = (
-            (known.mean, known.spread)
-            if own is None
-            else known.expected(float(values[own]), float(deviations[own]))
-        )
-    return found
+        own = np.array([name == machine for name in panel.machines])
+        if np.count_nonzero(~own) < FEWEST:
+            continue
+        known = kind_of(values[~own], deviations[~own])
+        told = known.mean, known.spread
+        if own.any():
+            told = known.expected(float(values[own][0]), float(deviations[own][0]))
+        yield KindParameter(
+            panel.axis, panel.parameter, panel.unit, known.mean, known.spread,
+            int(np.count_nonzero(~own)), *told,
+        )  # fmt: skip
 
 
-def begun(model: MachineModel, told: Mapping[tuple[str, str], tuple[float, float]]) -> MachineModel:
-    """A model whose parameters start where its kind is."""
+def begun(model: MachineModel, told: Iterable[KindParameter]) -> MachineModel:
+    """A model whose parameters start where they are expected."""
+    values = {(one.axis, one.parameter): one.expected for one in told}
     for name, axis in model.axes.items():
-        model = model.with_axis(name, _begun(name, axis, told))
+        where = [c for c in all_parameters(axis) if (name, c.label) in values]
+        model = model.with_axis(name, write(axis, where, [values[name, c.label] for c in where]))
     return model
-
-
-def _begun(
-    name: str, axis: AxisModel, told: Mapping[tuple[str, str], tuple[float, float]]
-) -> AxisModel:
-    where = [c for c in all_parameters(axis) if (name, c.label) in told]
-    return write(axis, where, [told[name, c.label][0] for c in where])

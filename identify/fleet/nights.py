@@ -100,6 +100,15 @@ def _panel(base: Any, which: Sequence[str], unit: str) -> Panel:
                  spread * TO_DEVIATION, temperature, distance)  # fmt: skip
 
 
+def median(values: Array, axis: int) -> Array:
+    """The median along an axis of those that are numbers; not a number where none is."""
+    ordered = np.sort(values, axis=axis)  # what is no number comes last
+    count = np.isfinite(values).sum(axis=axis, keepdims=True)
+    middle = (np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[axis] - 1))
+    low, high = (np.take_along_axis(ordered, i, axis) for i in middle)
+    return np.squeeze(0.5 * (low + high), axis=axis)
+
+
 def _plain(column: Any) -> Array:
     """A column of numbers; not a number where it is null."""
     return np.ma.filled(np.ma.asarray(column).astype(float), np.nan)

@@ -10,7 +10,7 @@ import numpy as np
 from identify.fleet.alarms import LAST_NIGHTS, Relative, relative
 from identify.fleet.kept_alarms import alarms
 from identify.fleet.kind import off
-from identify.fleet.nights import FORCE_ERROR, Panel, panels
+from identify.fleet.nights import FORCE_ERROR, Panel, median, panels
 from identify.fleet.store import Contents, Store
 from identify.fleet.views import connected
 from identify.results.fleet import Alarm, Course, Floor, MachineState, Off, Scope
@@ -85,7 +85,7 @@ def _course(made: Relative, i: int) -> Course:
     panel = made.panel
     centre, size = made.centres[i], made.sizes[i]
     alone = centre + size * made.own[i]
-    usual = np.nanmedian(panel.values, axis=0)
+    usual = median(panel.values, axis=0)
     return Course(
         axis=panel.axis, parameter=panel.parameter, unit=panel.unit, days=panel.days,
         distance=np.cumsum(np.nan_to_num(panel.distances[i])), values=panel.values[i],

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
 from io import BytesIO
@@ -19,7 +20,7 @@ from typing import Any
 from identify.fleet.columns import RECORD, TYPES, Column
 from identify.fleet.engine import needed
 from twin.errors import InputError
-from twin.files import make_folder, write_atomically
+from twin.files import lock, make_folder, write_atomically
 
 NAME = re.compile(r"[0-9a-f]{64}\.parquet")  # of a record: its key
 PACK_FROM = 1000  # records from which they are packed while more are made: each is a file to open
@@ -84,24 +85,27 @@ class Store:
     def pack(self, least: int = PACK_FROM) -> int:
         """Put records into one file where there are that many; how many that were.
 
-        Packing twice at once only writes the same rows twice.
+        Where another run packs just now, it is left to that.
         """
+        with _alone(self.root / "pack.lock") as mine:
+            return self._pack(least) if mine else 0
+
+    def _pack(self, least: int) -> int:
         pa, pq = needed("pyarrow"), needed("pyarrow.parquet")
-        names = sorted(p.name for p in self.records.glob("*.parquet") if NAME.fullmatch(p.name))
-        if len(names) < least:
+        known = frozenset[str]().union(*(keys_of(path) for path in _packed(self.packed)))
+        files = [p for p in sorted(self.records.glob("*.parquet")) if NAME.fullmatch(p.name)]
+        for path in files:
+            if path.stem in known:  # a run was killed before it removed them
+                path.unlink(missing_ok=True)
+        fresh = [path for path in files if path.stem not in known and fault(path) is None]
+        if len(fresh) < max(least, 1):
             return 0
-        tables, used = [], []
-        for name in names:
-            if fault(self.records / name) is None:
-                tables.append(pq.read_table(self.records / name))
-                used.append(name)
-        if not used:
-            return 0
-        digest = hashlib.sha256("\n".join(used).encode()).hexdigest()
-        write_atomically(self.packed / f"{digest}.parquet", parquet(pa.concat_tables(tables)))
-        for name in used:
-            (self.records / name).unlink(missing_ok=True)
-        return len(used)
+        content = pa.concat_tables([pq.read_table(path) for path in fresh])
+        digest = hashlib.sha256("\n".join(path.stem for path in fresh).encode()).hexdigest()
+        write_atomically(self.packed / f"{digest}.parquet", parquet(content))
+        for path in fresh:
+            path.unlink(missing_ok=True)
+        return len(fresh)
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ def parquet(content: Any) -> bytes:
 
 
 @cache  # a packed file has the name of what is in it, and never changes
-def keys_of(path: Path) -> frozenset[bytes | str]:
+def keys_of(path: Path) -> frozenset[str]:
     """The keys of a packed file; none of one that cannot be read."""
     pq = needed("pyarrow.parquet")
     if fault(path) is not None:
@@ -189,3 +193,15 @@ def _first(error: BaseException) -> str:
     """The first words of what a library says, in one line."""
     most = 80  # characters
     return " ".join(str(error).split())[:most]
+
+
+@contextmanager
+def _alone(path: Path) -> Iterator[bool]:
+    """Whether nobody else is in there; nobody comes in meanwhile."""
+    with path.open("ab") as stream:
+        try:
+            lock(stream)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True

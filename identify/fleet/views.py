@@ -29,18 +29,19 @@ def _rows_of(base: Any, contents: Contents) -> str:
     if not contents.paths:
         base.register("nothing", table((), RECORD))
         return "nothing"
-    files = listed(contents.paths)
-    named = f"read_parquet({files}, filename = true)"
-    places, keys = base.execute(
-        f"SELECT sum(files), count(*) FROM (SELECT count(DISTINCT filename) AS files FROM {named} "
-        "GROUP BY key)"
-    ).fetchone()
-    if places == keys:
-        return f"read_parquet({files})"
-    base.execute(
-        f"CREATE TABLE places AS SELECT key, min(filename) AS filename FROM {named} GROUP BY key"
-    )
-    return f"(SELECT r.* FROM {named} r JOIN places USING (key, filename))"
+    doubled = _doubled(base, contents)
+    singles = [path for path in contents.singles if path.stem not in doubled]
+    return f"read_parquet({listed([*contents.packed, *singles])})"
+
+
+def _doubled(base: Any, contents: Contents) -> set[str]:
+    """The keys of single records that are packed as well."""
+    if not contents.packed or not contents.singles:
+        return set()
+    keys = [path.stem for path in contents.singles]
+    packed = f"SELECT DISTINCT key FROM read_parquet({listed(contents.packed)})"
+    rows = base.execute(f"{packed} WHERE list_contains($1, key)", [keys]).fetchall()
+    return {key for (key,) in rows}
 
 
 def listed(paths: Sequence[Path]) -> str:

@@ -12,7 +12,16 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
-from identify.output.answers import SCHEMA, Answer, answer_of, diagnoses, fits, frequency, machine
+from identify.output.answers import (
+    SCHEMA,
+    Answer,
+    answer_of,
+    diagnoses,
+    fits,
+    fleet,
+    frequency,
+    machine,
+)
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.files import write_atomically
@@ -53,7 +62,9 @@ def _place(answer: type[Answer]) -> str:
 def answers() -> list[type[Answer]]:
     """The class of every object that a command prints."""
     known = {
-        k: v for module in (machine, fits, diagnoses, frequency) for k, v in vars(module).items()
+        k: v
+        for module in (machine, fits, diagnoses, frequency, fleet)
+        for k, v in vars(module).items()
     }
     return [v for k, v in known.items() if k.endswith("Answer") and v is not Answer]
 

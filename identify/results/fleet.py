@@ -83,6 +83,24 @@ class Off:
     far: float
 
 
+@dataclass(frozen=True)
+class KindParameter:
+    """A parameter of a kind: mean of its machines, and their standard deviation around it.
+
+    expected, deviation: of one machine by its own logs and its kind, and how sure that is; of one
+    without a log what the kind is.
+    """
+
+    axis: str
+    parameter: str
+    unit: str
+    mean: float
+    spread: float
+    machines: int
+    expected: float
+    deviation: float
+
+
 @dataclass(frozen=True, eq=False)
 class Course:
     """A parameter of a machine over n nights, not a number where there is none.

@@ -107,3 +107,25 @@ class FleetDemoAnswer(Answer):
     hall: list[AlarmEntry] = read("floor.hall")
     false_alarms: int
     page: File
+
+
+class KindEntry(Entry):
+    """A parameter of a kind: mean and standard deviation of its machines; what is expected."""
+
+    axis: str
+    parameter: str
+    unit: str
+    mean: Number
+    spread: Number
+    machines: int
+    expected: Number
+    deviation: Number
+
+
+class KindAnswer(Answer):
+    """What `twin fleet kind` prints; machine: whose own logs took part; null: of a new one."""
+
+    kind: str
+    machine: str | None
+    parameters: list[KindEntry]
+    model: File | None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from identify.output.numbers import NOTHING, listed, number, percent, quantity, with_band
-from identify.results.fleet import Alarm, Floor, Ingested, MachineState, Off, Told
+from identify.results.fleet import Alarm, Floor, Ingested, KindParameter, MachineState, Off, Told
 
 
 def ingested_in_words(done: Ingested) -> str:
@@ -103,3 +103,16 @@ def demo_in_words(planted: Sequence[Told], floor: Floor, right: bool, page: Path
     lines = [f"planted: {p.what} on {p.machine}, from {p.night} on" for p in planted]
     verdict = "all of it was found, and nothing else" if right else "not all that was told is right"
     return "\n".join([*lines, floor_in_words(floor), verdict, f"page: {page}"])
+
+
+def kind_in_words(kind: str, told: Sequence[KindParameter], machine: str | None) -> str:
+    """What a kind is, and what is expected of a machine of it."""
+    who = machine or "a new machine"
+    lines = [f"kind {kind}, by {max(p.machines for p in told)} machines"]
+    for one in told:
+        spread = (
+            f"{quantity(one.mean, one.unit)}, {quantity(one.spread, one.unit)} between machines"
+        )
+        own = with_band(one.expected, 1.645 * one.deviation, one.unit)
+        lines.append(f"  {one.parameter} of axis {one.axis}: {spread}; of {who} {own} is expected")
+    return "\n".join(lines)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fleet_cases import MODELS, panel
 
-from identify.fleet.kind import begun, expected, kind_of, off
+from identify.fleet.kind import begun, kind_of, kinds, off
 
 MEAN, BETWEEN, WITHIN = 2.0, 0.05, 0.2
 
@@ -52,8 +52,14 @@ def test_one_machine_that_is_off_from_its_kind_is_told() -> None:
 
 def test_a_model_begins_where_its_kind_is() -> None:
     model = MODELS.of("any").model
-    values = np.random.default_rng(3).normal(2.5, 0.1, (8, 20))
-    told = expected([panel(values, "coulomb_viscous.Fc")], "stage")
+    rng = np.random.default_rng(3)
+    values = rng.normal(2.5, 0.1, (8, 1)) + rng.normal(0.0, 0.02, (8, 20))
+    panels = [panel(values, "coulomb_viscous.Fc")]
+    told = [*kinds(panels, "stage")]
     made = begun(model, told).axes["x"]
-    assert made["coulomb_viscous"].values["Fc"] == pytest.approx(2.5, abs=0.05)
+    assert made["coulomb_viscous"].values["Fc"] == pytest.approx(2.5, abs=0.1)
     assert made.mass == model.axes["x"].mass
+    (of_one,) = kinds(panels, "stage", "m3")
+    assert of_one.machines == 7
+    assert of_one.deviation < told[0].deviation
+    assert [*kinds(panels, "another")] == []
