@@ -14,6 +14,7 @@ import numpy as np
 
 from identify.dataset.motion import Motion
 from identify.experiment_design.planting import signature
+from identify.fleet.columns import VIEWS
 from identify.output.machine import draw, itself_in_words
 from twin.checks.report import Fault
 from twin.effect import Effect, Kind
@@ -50,6 +51,7 @@ def everything() -> None:
         _write(GALLERY / f"{name}.md", effect_page(effect, alike[name]))
     _write(GENERATED / "gallery.md", gallery(catalogue))
     _write(GENERATED / "commands.md", commands())
+    _write(GENERATED / "fleet.md", views())
     _write(GENERATED / "faults.md", "".join(f"- {fault.value}\n" for fault in Fault))
     for name in ("model", "map", "answers"):
         schema = json.loads((SCHEMAS / f"{name}.schema.json").read_text(encoding="utf-8"))
@@ -166,12 +168,41 @@ def _plain() -> dict[str, str]:
 
 def commands() -> str:
     overview = twin("--help")
-    listed = overview.split("Commands:")[1].splitlines()
-    names = [line.split()[0] for line in listed if line[:2] == "  " and line[2:3].strip()]
     lines = ["```text", overview.rstrip(), "```"]
-    for name in names:
-        lines += [f"## twin {name}", "```text", twin(name, "--help").rstrip(), "```"]
+    for name in _listed(overview):
+        lines += _command(name)
     return _joined(lines)
+
+
+def _command(*names: str) -> list[str]:
+    """The help of a command, and of those that it has."""
+    shown = twin(*names, "--help").rstrip()
+    lines = [f"## twin {' '.join(names)}", "```text", shown, "```"]
+    return lines + [line for name in _listed(shown) for line in _command(*names, name)]
+
+
+def _listed(shown: str) -> list[str]:
+    """The commands that a help lists."""
+    listed = shown.partition("Commands:")[2].splitlines()
+    return [line.split()[0] for line in listed if line[:2] == "  " and line[2:3].strip()]
+
+
+# Views of a fleet.
+
+
+def views() -> str:
+    lines = []
+    for view, columns in VIEWS.items():
+        rows = [(f"`{c.name}`", c.kind, _in_column(c.unit), c.meaning) for c in columns]
+        lines += [f"**{view}**", _table(("column", "type", "unit", "meaning"), rows)]
+    return _joined(lines)
+
+
+def _in_column(unit: str) -> str:
+    """Where the unit of a column stands in another, its name."""
+    for other in ("force_unit", "unit"):
+        unit = unit.replace(other, f"`{other}`") if unit.startswith(other) else unit
+    return unit
 
 
 # Schemas.

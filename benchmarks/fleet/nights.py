@@ -7,7 +7,7 @@ has been run in.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,9 +55,11 @@ def weather(rng: np.random.Generator, shape: tuple[int, ...], size: float) -> Ar
     return size * out
 
 
-def drawn(machines: int, nights: int, rng: np.random.Generator, thermometer: float = 0.0):
+def drawn(
+    machines: int, nights: int, rng: np.random.Generator, thermometer: float = 0.0
+) -> Iterator[Panel]:
     """A panel of each parameter; thermometer: 1 where the logs tell the temperature, else 0."""
-    day = np.arange(nights)
+    day = np.arange(float(nights))
     yearly = YEARLY * np.sin(2.0 * np.pi * (day / YEAR + rng.random()))
     hall = yearly + weather(rng, (nights,), WEATHER)
     warm = hall + weather(rng, (machines, nights), CORNER)

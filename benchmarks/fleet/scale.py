@@ -117,7 +117,7 @@ def _short(folder: Path) -> Log:
 def _workers(folder: Path) -> Iterator[Figure]:
     for night in nights_of(folder / "logs", 8, WORKED // 8, seed=2):
         record_night(night)
-    seconds = {}
+    seconds: dict[int, float] = {}
     for count in (1, 2, 2, 1):
         store = folder / "store"
         shutil.rmtree(store, ignore_errors=True)

@@ -13,10 +13,12 @@ from identify.cli.shared import Effects, app, written
 from twin.errors import InputError
 from twin.telling import heard
 
+ABOUT = "Watch many machines: their logs over time, what changed and when."
 fleet = Commands(
-    help="Watch many machines: their logs over time, trends and alarms.", rich_markup_mode=None
+    help=f"{ABOUT}\n\nExample: twin fleet ingest nights --model stage.toml --store fleet",
+    rich_markup_mode=None,
 )
-app.add_typer(fleet, name="fleet")
+app.add_typer(fleet, name="fleet", short_help=ABOUT)
 
 StoreOption = Annotated[Path, Option("--store", metavar="DIR", help="Folder of the records.")]
 Workers = Annotated[

@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.fleet.change_point import Change, changes
 from identify.fleet.nights import FORCE_ERROR, TO_DEVIATION, Panel, median
 from identify.fleet.rates import level_of
 from identify.results.fleet import Alarm, Scope
 from twin.signals import Array
+
+Nights = NDArray[np.intp]  # columns of a panel
 
 DEAD = 0.01  # of a parameter, below which a change is nobody's concern
 DEAD_ERROR = 0.25  # of the force error
@@ -155,7 +158,7 @@ def _restored(shown: Relative, machine: int) -> Callable[[float], float]:
 
 
 def _chains(
-    shown: Relative, values: Array, found: Sequence[Change], nights: Array,
+    shown: Relative, values: Array, found: Sequence[Change], nights: Nights,
     restore: Callable[[float], float],
 ) -> Iterator[Alarm]:  # fmt: skip
     """The alarms of a series; changes the same way, one behind the other, are one that grows."""
@@ -170,7 +173,7 @@ def _chains(
 
 
 def _alarm(
-    shown: Relative, values: Array, edges: Sequence[int], chain: Sequence[Change], nights: Array,
+    shown: Relative, values: Array, edges: Sequence[int], chain: Sequence[Change], nights: Nights,
     restore: Callable[[float], float],
 ) -> Alarm:  # fmt: skip
     panel, first = shown.panel, chain[0]

@@ -206,8 +206,8 @@ def _read(task: Task, origin: Origin) -> tuple[Log, CheckReport]:
     axes = {name: axis for name, axis in log.axes.items() if name == origin.axis}
     if not axes:
         there = ", ".join(log.axes)
-        error = f"{task.name}: has no axis {origin.axis}; there are {there}"
-        raise Refused(LogFault.UNNAMED, error)
+        text = f"{task.name}: has no axis {origin.axis}; there are {there}"
+        raise Refused(LogFault.UNNAMED, text)
     told = tuple(f for f in report.findings if f.axis in axes)
     return replace(log, axes=axes), CheckReport(told)
 

@@ -115,6 +115,7 @@ def test_faults_are_one_line_and_a_file_that_is_no_log_too(tmp_path) -> None:
 
 ROOT = Path(__file__).parent.parent.parent
 COMMANDS = {n: c for n, c in typer.main.get_command(app).commands.items() if not c.hidden}
+EVERY = COMMANDS | {f"fleet {n}": c for n, c in COMMANDS["fleet"].commands.items()}
 
 
 def test_a_whole_installation_is_one_line_each(tmp_path) -> None:
@@ -162,13 +163,13 @@ def test_the_list_of_commands_has_whole_sentences(tmp_path) -> None:
         assert first in " ".join(said.split())
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS))
+@pytest.mark.parametrize("name", sorted(EVERY))
 def test_the_help_of_a_command_has_an_example_that_it_takes(name, tmp_path) -> None:
-    (line,) = re.findall(r"^\s*Example: twin (.+)$", COMMANDS[name].help, re.MULTILINE)
-    assert f"Example: twin {name}" in cli_runs.twin(name, "--help", folder=tmp_path).stdout
-    first, *arguments = shlex.split(line)
-    assert first == name
-    COMMANDS[name].make_context(name, arguments)  # raises for an option that is not there
+    (line,) = re.findall(r"^\s*Example: twin (.+)$", EVERY[name].help, re.MULTILINE)
+    words, given = name.split(), shlex.split(line)
+    assert f"Example: twin {name}" in cli_runs.twin(*words, "--help", folder=tmp_path).stdout
+    assert given[: len(words)] == words
+    EVERY[name].make_context(name, given[len(words) :])  # raises for an option that is not there
 
 
 def test_a_shell_completes_commands_and_options(tmp_path) -> None:

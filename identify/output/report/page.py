@@ -99,9 +99,10 @@ class Chart(Block):
     def spec(self) -> dict[str, Any]:
         """What report.js draws."""
         edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is Line.BAND]
+        dates = {"dates": True} if self.dates else {}
         x = self.x[1].tolist() if self.dates else printed(self.x[1])
         return {
-            "x": {"label": self.x[0], "values": x, "log": self.log_x, "dates": self.dates},
+            "x": {"label": self.x[0], "values": x, "log": self.log_x, **dates},
             "y": {"label": self.y, "log": self.log_y},
             "series": [
                 {"label": typeset(d.label), "values": printed(d.values), "kind": d.line.value,

@@ -336,7 +336,7 @@ for (const place of document.querySelectorAll("[data-chart]")) {
   plot(place, {
     height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => spec.x.dates ? day(v) : digits(v)},
     ...(spec.x.dates ? {days: (u, at) => at.map(v => day(v).slice(5))} : {}), tzDate: v => uPlot.tzDate(new Date(v * 1e3), "Etc/UTC"),
-    scales: {x: {time: spec.x.dates, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
+    scales: {x: {time: !!spec.x.dates, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
     series: spec.series.map(s => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind], width: s.kind === "band" ? 0.5 : 1.5})),
     cursor: {drag: {x: true, y: false}},
   }, [spec.x.values, ...spec.series.map(s => s.values)]);
