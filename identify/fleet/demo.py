@@ -18,11 +18,11 @@ from identify.fleet.state import floor_of
 from identify.fleet.store import Store
 from identify.output.report.fleet import write_fleet
 from identify.results.fleet import Alarm, Floor, Told
-from twin.files import make_folder
+from twin.files import make_folder, write_atomically
 from twin.parallel import Progress, silent
 
 MACHINES, NIGHTS = 20, 90
-LOGS, STORE, PAGE = "logs", "store", "fleet.html"
+LOGS, STORE, MODEL, PAGE = "logs", "store", "stage.toml", "fleet.html"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +61,13 @@ def demo(
     workers: int | None = None,
     progress: Progress = silent,
 ) -> Demo:
-    """Draw a floor, ingest its logs, and tell what changed; writes logs, store and page.
+    """Draw a floor, ingest its logs, and tell what changed; writes logs, model, store and page.
 
     Raises InputError where the folder cannot be written.
     """
     logs, store, page = folder / LOGS, folder / STORE, folder / PAGE
     make_folder(logs)
+    write_atomically(folder / MODEL, STAGE.read_bytes())
     plan, models = Plan.of(), Models.at(STAGE)
     total = machines * nights
     with engine(workers=workers) as (executor, count):
