@@ -151,7 +151,7 @@ def _held(part: Path) -> BinaryIO:
     Until its lock it looks like one that a killed run has left.
     """
     while True:
-        stream = open(part, "ab")
+        stream = open(part, "ab")  # noqa: SIM115 - it is given open
         try:
             lock(stream)
             if os.path.samestat(os.stat(part), os.fstat(stream.fileno())):

@@ -369,7 +369,11 @@ def _built_up(position: Array, width: float) -> Array:
     """
     held, out, way = 0.0, [], position / width
     for step in np.diff(way, prepend=way[0]).tolist():
-        held = min(max(held + step, -1.0), 1.0)
+        held += step  # compared, as to call min and max takes most of a check
+        if held > 1.0:
+            held = 1.0
+        elif held < -1.0:
+            held = -1.0
         out.append(held)
     return np.array(out)
 
