@@ -7,11 +7,8 @@ again. A rate that hardly moves tells that nothing hangs on the number; one that
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import os
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import fields
 
 import numpy as np
@@ -22,6 +19,7 @@ from benchmarks.selftest.laws import OUTSIDE
 from benchmarks.selftest.machines import Case
 from benchmarks.selftest.tally import rates
 from benchmarks.selftest.trial import TrialResult, run
+from identify.fleet.engine import engine
 from identify.rules import RULE
 
 TITLE = "The rule's numbers, each halved and doubled"
@@ -68,8 +66,7 @@ def run_with(setting: Setting, case: Case) -> TrialResult:
 def results_of(cases: Sequence[Case]) -> dict[Setting, list[TrialResult]]:
     """Results by setting, in as many processes as there are cores."""
     out = {}
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=context) as pool:
+    with engine() as (pool, _):
         for setting in settings():
             out[setting] = list(pool.map(run_with, [setting] * len(cases), cases))
             print(f"  {described(setting)}: {line(out[setting])}", file=sys.stderr, flush=True)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from itertools import combinations, cycle, islice
 from typing import TypeVar
@@ -17,6 +14,7 @@ from benchmarks.selftest.laws import OUTSIDE
 from benchmarks.selftest.machines import AXIS, STAGE, Case
 from benchmarks.selftest.trial import TrialResult, run
 from benchmarks.selftest.variations import VARIATIONS
+from identify.fleet.engine import engine, outcomes
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
 from twin.logs.writer import software_version
@@ -114,15 +112,17 @@ def run_all(
     Raises RuntimeError, with the machine named, where a diagnosis fails; no other is begun then.
     """
     found: dict[Case, TrialResult] = {}
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers or os.cpu_count(), mp_context=context) as pool:
-        jobs = {pool.submit(run, case): case for case in cases}
-        for done in as_completed(jobs):
-            if error := done.exception():
-                pool.shutdown(cancel_futures=True)
-                raise RuntimeError(f"{jobs[done]}: {error!r}") from error
-            result = done.result()
+    with engine(workers=workers) as (executor, count):
+        for result in outcomes(executor, count, _named, cases):
             found[result.case] = result
             if progress:
                 progress(result, len(found), len(cases))
     return [found[case] for case in cases]
+
+
+def _named(case: Case) -> TrialResult:
+    """A trial; what it raises names its machine."""
+    try:
+        return run(case)
+    except Exception as error:
+        raise RuntimeError(f"{case}: {error!r}") from error
