@@ -17,6 +17,7 @@ NEEDED = (
     "zstandard", "lz4", "ruckig", "typer", "rich", "jinja2", "tomlkit", "threadpoolctl",
     "python-dateutil",
 )  # fmt: skip
+FOR_FLEET = ("dask", "distributed", "duckdb", "pyarrow")
 FOR_IMPORT = ("h5py", "mcap-protobuf-support", "rosbags", "pyarrow", "npTDMS")
 AGAIN = "pip install --upgrade proton-twin"
 
@@ -78,6 +79,13 @@ def _importers() -> Line:
     return Line("importers", found or "CSV, MAT and JSON alone", remedy, needed=False)
 
 
+def _fleet() -> Line:
+    found, absent = _versions(FOR_FLEET)
+    how = f"lacks {', '.join(absent)} (`twin fleet`): "
+    remedy = how + pip_install("fleet") if absent else None
+    return Line("fleet", found or "none of its packages", remedy, needed=False)
+
+
 def _versions(names: tuple[str, ...]) -> tuple[str, list[str]]:
     from twin.logs.writer import software_version
 
@@ -131,5 +139,5 @@ def _threads() -> Line:
 
 
 LOOKS: tuple[Callable[[], Line], ...] = (
-    _twin, _python, _packages, _importers, _cache, _mujoco, _display, _threads,
+    _twin, _python, _packages, _importers, _fleet, _cache, _mujoco, _display, _threads,
 )  # fmt: skip

@@ -183,3 +183,18 @@ class Told:
     night: date
     size: float | None = None
     unit: str | None = None
+
+
+@dataclass(frozen=True)
+class LiveAlarm:
+    """A change of the force error of a machine that runs, in ``unit`` RMS.
+
+    time: s of the log at which it was told; changed: since when.
+    """
+
+    axis: str
+    time: float
+    changed: float
+    before: float
+    after: float
+    unit: str

@@ -129,3 +129,24 @@ class KindAnswer(Answer):
     machine: str | None
     parameters: list[KindEntry]
     model: File | None
+
+
+class LiveAlarmEntry(Entry):
+    """A change of the force error (RMS); times in s of the log."""
+
+    axis: str
+    time: Number
+    changed: Number
+    before: Number
+    after: Number
+    unit: str
+
+
+class WatchAnswer(Answer):
+    """What `twin watch` prints in the end; ended: whether the writer has closed the log."""
+
+    log: File
+    windows: int
+    ended: bool
+    alarms: list[LiveAlarmEntry]
+    told: list[str]

@@ -7,7 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from identify.output.numbers import NOTHING, listed, number, percent, quantity, with_band
-from identify.results.fleet import Alarm, Floor, Ingested, KindParameter, MachineState, Off, Told
+from identify.results.fleet import (
+    Alarm,
+    Floor,
+    Ingested,
+    KindParameter,
+    LiveAlarm,
+    MachineState,
+    Off,
+    Told,
+)
 
 
 def ingested_in_words(done: Ingested) -> str:
@@ -116,3 +125,12 @@ def kind_in_words(kind: str, told: Sequence[KindParameter], machine: str | None)
         own = with_band(one.expected, 1.645 * one.deviation, one.unit)
         lines.append(f"  {one.parameter} of axis {one.axis}: {spread}; of {who} {own} is expected")
     return "\n".join(lines)
+
+
+def live_in_words(alarm: LiveAlarm) -> str:
+    """An alarm of a machine that runs."""
+    errors = f"{quantity(alarm.before, alarm.unit)} to {quantity(alarm.after, alarm.unit)} RMS"
+    return (
+        f"force error of axis {alarm.axis} {'rose' if alarm.after > alarm.before else 'fell'} from "
+        f"{errors} since {alarm.changed:.1f} s, told at {alarm.time:.1f} s"
+    )

@@ -1,0 +1,92 @@
+"""A log is followed while it is written, and a change of its residual is told within seconds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_runs import refusal, twin
+from machines import tracked
+
+from identify.fleet.floor import STAGE
+from identify.fleet.watch import Watcher
+from twin.logs import Log, write_log
+from twin.logs.follow import Follower
+from twin.model.file import load_model
+
+MODEL = load_model(STAGE)
+SINCE, SECONDS = 17.0, 23.0
+FLOOR = 2e-3  # N RMS, about what noise leaves in a window
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    return tracked(MODEL, seed=2, duration=SECONDS)
+
+
+def spoilt(log: Log, size: float) -> Log:
+    """With a force from a time on that no effect of the model makes; N RMS."""
+    extra = np.sqrt(2.0) * size * np.sin(2.0 * np.pi * log.axes["x"].position / 0.02)
+    extra *= log.time >= SINCE
+    constant = log.axes["x"].force_constant or 1.0
+    per = {"force": 1.0, "current": 1.0 / constant}
+    return log.changed(lambda name, c: c + per[name] * extra if name in per else c)
+
+
+def written(log: Log, folder: Path) -> bytes:
+    write_log(replace(log, truth={}), folder / "whole.mcap", chunk_bytes=1 << 14)
+    return (folder / "whole.mcap").read_bytes()
+
+
+def test_the_windows_of_a_growing_file_are_those_of_the_whole(log, tmp_path) -> None:
+    data, path, seen = written(log, tmp_path), tmp_path / "live.mcap", []
+    follower = Follower(path)
+    assert list(follower.windows(1.0)) == []  # its writer has not begun
+    for size in range(0, len(data) + 40_001, 40_001):
+        path.write_bytes(data[:size])
+        seen += follower.windows(1.0)
+    assert follower.ended
+    assert follower.told == []
+    assert [start for start, _ in seen] == pytest.approx(range(int(SECONDS)))
+    for i, (_, window) in enumerate(seen):
+        part = log.part(1000 * i, 1000 * (i + 1))
+        assert np.array_equal(window.axes["x"].position, part.axes["x"].position)
+
+
+def test_a_change_of_five_floors_is_told_within_five_seconds_and_no_other(log) -> None:
+    watcher, changed, alarms = Watcher(MODEL), spoilt(log, 5.0 * FLOOR), []
+    for i in range(int(SECONDS)):
+        alarms += watcher.take(float(i), changed.part(1000 * i, 1000 * (i + 1)))
+    (alarm,) = alarms
+    assert SINCE < alarm.time <= SINCE + 5.0
+    assert abs(alarm.changed - SINCE) <= 1.0
+    assert alarm.after > 2.0 * alarm.before
+
+
+def test_a_torn_chunk_and_a_writer_that_begins_anew_are_told_and_followed(log, tmp_path) -> None:
+    data = bytearray(written(log.part(0, 12_000), tmp_path))
+    data[len(data) // 2] ^= 0xFF
+    path = tmp_path / "live.mcap"
+    path.write_bytes(data)
+    follower = Follower(path)
+    first = [start for start, _ in follower.windows(1.0)]
+    assert "left out" in follower.told[0]
+    assert 8 <= len(first) < 12
+    path.unlink()
+    path.write_bytes(written(log.part(0, 5000), tmp_path))
+    assert len(list(follower.windows(1.0))) == 5
+    assert "begins anew" in follower.told[-1]
+
+
+def test_the_command_ends_with_the_log(log, tmp_path) -> None:
+    written(log.part(0, 6000), tmp_path)
+    done = twin("watch", "whole.mcap", STAGE, "--json", folder=tmp_path)
+    found = json.loads(done.stdout)
+    assert (done.returncode, found["ended"], found["windows"]) == (0, True, 6)
+    assert found["alarms"] == found["told"] == []
+    assert "is no file" in refusal("watch", "gone.mcap", STAGE, folder=tmp_path)
+    (tmp_path / "none.mcap").write_bytes(b"not a log")
+    assert "not an MCAP file" in refusal("watch", "none.mcap", STAGE, folder=tmp_path)
