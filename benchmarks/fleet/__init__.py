@@ -1,8 +1,8 @@
 """A floor of machines: how often alarms are false, how soon they come, what a store costs.
 
 ``python -m benchmarks fleet --calibrate`` prints the rates that ``identify.fleet.rates`` holds,
-``--rates`` and ``--scale`` the one half of the figures or the other, ``--kills`` those of 100 ingests
-that are killed, in a quarter of an hour.
+``--rates`` and ``--scale`` the one half of the figures or the other, ``--kills`` those of 100
+ingests that are killed, in a quarter of an hour.
 """
 
 from __future__ import annotations

@@ -126,6 +126,6 @@ def _workers(folder: Path) -> Iterator[Figure]:
         twin("fleet", "ingest", folder / "logs", *given)
         seconds[count] = min(time.perf_counter() - begun, seconds.get(count, np.inf))
     yield Figure("logs an hour by one worker", 3600.0 * WORKED / seconds[1], "1",
-                 note="of 4 s, one axis, 1 kHz, with the start of the processes")  # fmt: skip
+                 note="of 3 s, one axis, 1 kHz, with the start of the processes")  # fmt: skip
     yield Figure("two workers over one", seconds[1] / seconds[2], "1", Target(1.85),
                  f"{WORKED} logs, the better of two runs each")  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.estimation.intervals import scatter
+from identify.estimation.intervals import ModelWrong, scatter
 from identify.fleet.found_logs import Origin, Pattern, origin_of
 from identify.fleet.models import Machine, Models
 from identify.fleet.store import Row, Store
@@ -231,12 +231,15 @@ def _of_check(report: CheckReport) -> Iterator[Row]:
 def _of_fit(made: Fitted) -> Iterator[Row]:
     """A row a parameter that was free."""
     for axis, fitted in made.fits.fits.items():
-        spreads = scatter(fitted).ends
+        told = made.fits.estimates[axis]
+        refused = any(isinstance(e.reason, ModelWrong) for e in told)
+        # Of a model that is right both are one interval, which takes as long as a third of the fit.
+        spreads = scatter(fitted).ends if refused else {e.label: (e.low, e.high) for e in told}
         common = {
             "kind": "fit", "axis": axis, "error": fitted.error, "floor": fitted.floor,
             "force_unit": fitted.axis.units.force, **_of_motion(made.log, made.log.axes[axis]),
         }  # fmt: skip
-        for e in made.fits.estimates[axis]:
+        for e in told:
             if e.free:
                 low, high = spreads.get(e.label, (None, None))
                 yield {

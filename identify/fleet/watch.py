@@ -28,7 +28,7 @@ from twin.telling import heard
 
 WINDOW = 1.0  # s
 HISTORY = 3.0  # s before a window, in which what a law remembers comes to what it is
-RATE = 2000.0  # Hz: what is slower than this needs no more samples
+RATE = 1000.0  # Hz: what is slower than this needs no more samples
 LENGTH = 0.05  # s, of the test functions
 LEVEL = 5.0  # of the test: 4 false changes in a million windows, before the dead band
 KEPT = 200  # windows that are compared with

@@ -53,7 +53,7 @@ def test_each_log_is_a_record_with_a_row_a_free_parameter(logs, tmp_path) -> Non
     assert mass["low"] < mass["value"] < mass["high"]
     assert mass["error"] >= mass["floor"] > 0.0
     assert mass["distance"] > 0.1
-    assert mass["duration"] == pytest.approx(4.0)
+    assert mass["duration"] == pytest.approx(3.0)
 
 
 def test_what_is_known_is_not_made_again_and_the_same_elsewhere(first, tmp_path) -> None:
