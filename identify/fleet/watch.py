@@ -31,6 +31,7 @@ HISTORY = 3.0  # s before a window, in which what a law remembers comes to what 
 RATE = 1000.0  # Hz: what is slower than this needs no more samples
 LENGTH = 0.05  # s, of the test functions
 LEVEL = 5.0  # of the test: 4 false changes in a million windows, before the dead band
+LEAST = 1e-15  # N, so that no error is none: their ratios are compared
 KEPT = 200  # windows that are compared with
 AGAIN = 0.25  # s between two looks at the file
 
@@ -84,7 +85,7 @@ class Watcher:
             first = round((1.0 - share) * len(left))
             seen = left[first:][moves[first:]]
             if len(seen):
-                yield axis, float(np.sqrt(np.mean(seen**2)))
+                yield axis, max(float(np.sqrt(np.mean(seen**2))), LEAST)
 
     def _asked(self, axis: str) -> LiveAlarm | None:
         errors, ends = self.errors[axis], self.ends[axis]

@@ -83,8 +83,9 @@ COMMANDS = {
     "plan": "plan m.toml L --duration 1 -o next.toml",
     "recover": "recover L -o whole.mcap",
     "view": "view L m.toml --html view.html",
+    "watch": "watch L m.toml",
 }
-ONE_LOG = ("recover", "view", "export", "cut")
+ONE_LOG = ("recover", "view", "export", "cut", "watch")
 FEW = ("coulomb_viscous", "quadratic_drag", "wear", "empirical_map")
 FITTED = ("fit", "compare", "diagnose", "add", "plan", "new")
 
