@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from twin.effects import load_catalogue
-from twin.experiments.named import simulate
 from twin.logs import write_log
 from twin.model.file import load_model
 from twin.model.machine import Fitted, MachineModel
 from twin.model.parameters import all_parameters, read, write
 from twin.signals import Array
-from twin.simulator import ReducedSimulator
+from twin.simulation.simulate import simulate
+from twin.simulation.simulators import ReducedSimulator
 
 HERE = Path(__file__).parent
 STAGE, FLOOR = HERE / "demo_stage.toml", HERE / "demo_floor.toml"
