@@ -302,8 +302,12 @@ def diagnose(
 
 
 def recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:
-    """How the logs of a mechanism are another than its file needs, by the first of them."""
-    return misassigned(model, next(iter(logs.values()))) if model.joints else None
+    """How the logs of a mechanism are another than its file needs, by the first of them.
+
+    One without a joint of it is refused where its motion is read.
+    """
+    first = next(iter(logs.values()))
+    return misassigned(model, first) if model.joints and {*model.joints} <= {*first.axes} else None
 
 
 def read_as(recording: Recording | None, logs: Mapping[str, Log]) -> Mapping[str, Log]:
