@@ -160,6 +160,7 @@ def _held(part: Path) -> BinaryIO:
             pass
         except BlockingIOError as error:
             if part.suffix != PART:  # else it is being swept
+                stream.close()
                 text = f"{part}: another run is writing it; give another name"
                 raise InputError(text) from error
         stream.close()

@@ -145,9 +145,9 @@ def _against(
     if (moment := _moment(own, left, theirs, more)) is not None:
         return moment
     near, name = _near(own, others), own.log.motion.name
-    best = _best(own, left)
-    own_value = None if best is None else _otherwise(best, own, left, axis, where)
-    if best is not None and own_value is not None and near.any():
+    best, gain = _best(own, left)
+    own_value = None if gain is None else _otherwise(best, gain, own, axis, where)
+    if own_value is not None and near.any():
         change = abs(_gains(own, left, near)[0][best])
         far = change > more * CLEAR * _scatter(best, others, theirs)
         if far and change > CHANGED * _usual(best, own, own_value[2], where):
@@ -188,20 +188,22 @@ def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float
     return float(np.sqrt(np.sum(size * gain**2) / max(size.sum(), 1e-300) / freedom))
 
 
-def _best(own: _Rows, left: Array) -> int | None:
-    """The column that alone explains what is left (n,) N, the last that of the command."""
+def _best(own: _Rows, left: Array) -> tuple[int, float | None]:
+    """The column that alone takes most of what is left (n,) N, the last that of the command.
+
+    With its gain, where that explains it.
+    """
     most = 0.5  # of the squared error, that it takes by itself
     gains, size = _gains(own, left)
     taken = gains**2 * size / np.sum(left**2)
     best = int(np.argmax(taken))
-    return best if taken[best] > most else None
+    return best, float(gains[best]) if taken[best] > most else None
 
 
 def _otherwise(
-    best: int, own: _Rows, left: Array, axis: AxisModel, where: Sequence[ParameterReference]
+    best: int, gain: float, own: _Rows, axis: AxisModel, where: Sequence[ParameterReference]
 ) -> tuple[str, float, float] | None:
     """The parameter of a column, its value in a log and in others; None where it can have none."""
-    gain = float(_gains(own, left)[0][best])
     if best == len(where):
         return "force", 1.0 - gain, 1.0
     value = float(read(axis, where[best : best + 1])[0])
