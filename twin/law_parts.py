@@ -130,10 +130,14 @@ def stiffness_at_rest(meaning: str, tried: Sequence[float] = (3e-3, 3e-4, 3e-5))
     )  # fmt: skip
 
 
+GONE = 230.0  # exponent of a fall to 1e-100, which is none: what divides by less overflows
+
+
 def stribeck_level(io, coulomb, static, velocity, exponent):
     """g(v) = Fc + (Fs - Fc) exp(-|v/v0|^n), N, with what modifiers make of both levels."""
     q = abs(io[V]) / velocity
-    fall = exp(-q * q) if exponent == 2.0 else exp(-(q**exponent))
+    power = q * q if exponent == 2.0 else q**exponent
+    fall = exp(-power) if power < GONE else 0.0
     return io[DRY] * (coulomb + (static * io[STATIC] - coulomb) * fall)
 
 

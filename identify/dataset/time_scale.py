@@ -62,19 +62,19 @@ class AtLength:
 def choose_length(
     motions_at: Callable[[float | None], tuple[Motions, ...]], *, imposed: bool = False
 ) -> float:
-    """Length of the test functions, s, for the logs to fit and those that choose.
+    """Length of the test functions, s, for all logs that decide, whatever their roles.
 
-    motions_at: these for test functions of a length, whose blocks are short enough for it; for
-    None as long as their noise asks for. imposed: whether there is no mass.
+    motions_at: these by role for test functions of a length, whose blocks are short enough for it;
+    for None as long as their noise asks for. imposed: whether there is no mass.
     """
-    motions, others = motions_at(None)
-    chosen = choose_test_function(motions, others, imposed=imposed)
+    motions = [m for some in motions_at(None) for m in some]
+    chosen = choose_test_function(motions, imposed=imposed)
     shorter = [length for length in TEST_FUNCTIONS if length < chosen]
     if imposed or not shorter:
         return chosen
     quiet = AtLength.of(chosen, motions)
     for length in shorter:
-        finer = motions_at(length)[0]
+        finer = [m for some in motions_at(length) for m in some]
         if length < LEAST_BLOCKS * max(m.period for m in finer):
             continue
         if AtLength.of(length, finer).shows_more_than(quiet):
@@ -82,13 +82,13 @@ def choose_length(
     return chosen
 
 
-def choose_test_function(motions: Motions, others: Motions = (), *, imposed: bool = False) -> float:
+def choose_test_function(motions: Motions, *, imposed: bool = False) -> float:
     """The shortest test function (s) whose noise floor is small against the force to be explained.
 
-    others: motions whose blocks it must also be long enough for. imposed: whether there is no mass.
+    imposed: whether there is no mass.
     """
     mass = 0.0 if imposed else inertia(motions)
-    longest_block = max(m.period for m in (*motions, *others))
+    longest_block = max(m.period for m in motions)
     for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:
             continue

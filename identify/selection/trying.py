@@ -11,13 +11,13 @@ from functools import partial
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import knows_rounding
-from identify.estimation.alignment import moved_by
+from identify.estimation.alignment import aligned_as, moved_by
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves, turned
 from identify.estimation.free_curves import shapes_of
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import Judged, together
 from identify.selection.candidates import Candidate, candidate_of, noise_candidate
 from identify.selection.changes import (
     Added,
@@ -253,14 +253,23 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
     It is refitted whatever one linear step promises; ``Candidate.refused`` says why not to keep it.
     """
-    before, change = Judged(base, dataset), Added(effect)
+    before, change = together(base, dataset), Added(effect)
     if effect.is_noise:
-        return as_noise(before, effect).candidate
+        return as_noise(Judged(base, dataset), effect).candidate
     screening = change.screen(before, ControlTest.beside(before))
     fit = change.refit(before, screening)
     if not fit.at_floor:
-        fit = fit_multistart(from_all_starts(before, screening, fit).axis, dataset, base.begun)
-    return judged_change(before, screening, fit).candidate
+        fit = fit_multistart(
+            from_all_starts(before, screening, fit).axis, before.dataset, base.begun
+        )
+    tried = judged_change(before, screening, fit)
+    proof, axis = tried.candidate, tried.judged.fit.axis
+    if before.dataset is dataset:
+        return proof
+    there = aligned_as(tried.judged.dataset, dataset)
+    given = Judged(replace(fit_axis(base.axis, there.training), begun=base.begun), there)
+    own = candidate_of(given, refitted_on(axis, given), effect, parameters(change))
+    return replace(own, score=proof.score, doubt=proof.doubt)
 
 
 def reshape(

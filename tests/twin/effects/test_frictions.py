@@ -93,6 +93,16 @@ def test_asymmetric_friction_sticks_on_its_strong_side() -> None:
         assert run.x[-1] > 1e-3
 
 
+@pytest.mark.parametrize("name", ["gms", "leuven", "modified_leuven", "stribeck"])
+def test_a_level_that_falls_to_nothing_leaves_a_force_that_is_a_number(name) -> None:
+    """Without Coulomb friction, far beyond the Stribeck velocity, it falls below what divides."""
+    steps = np.linspace(36.0, 40.0, 4000)
+    speed = np.where(np.arange(len(steps)) % 4 < 2, 2.8, steps)  # m/s
+    law = effect(name, Fc=0.0, Fs=1e-9, v0=1.44, sigma2=0.0)
+    force = along(law, speed, 1.6e-3)
+    assert np.isfinite(force).all()
+
+
 def breakaway(name: str, rate: float) -> float:
     """Highest friction before the mass runs away under a force growing at that rate (N/s)."""
     run = pushed(1.0, [friction(name)], rate * time(2.0 / rate + 0.05))
