@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from identify.dataset.dataset import Dataset
 from identify.dataset.given_logs import require_moving
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.free_curves import having_shape
 from identify.estimation.offered import require_shown
 from identify.mechanism.bodies import corrected
@@ -20,8 +22,9 @@ from identify.results.results import (
     steps_together,
 )
 from identify.selection.acceptance import Judged, score
+from identify.selection.candidates import Candidate
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
-from identify.selection.trying import reshape, try_effect
+from identify.selection.trying import effect_tried, reshape
 from identify.workflow import Model, as_given, fit, fit_as_given, read_as, recording_of
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
@@ -69,15 +72,25 @@ def add(
             f"axis {', '.join(names)} has the effect '{effect.name}' already; `twin fit` refits it"
             f"{f', {effect.numbered(effect.number + 1).name} is another' if effect.several else ''}"
         )
-    attempt = fit_nonparametric if effect.is_nonparametric else try_effect
     progress("adding", 0, 1)
     shown = require_shown(effect, {n: (model.axes[n], before.datasets[n]) for n in open_axes})
-    tried = [attempt(before.fits[n], before.datasets[n], effect) for n in shown]
-    best = max(tried, key=lambda c: (c.supported, c.part, c.delta_bic))
+    tried = [_attempt(before.fits[n], before.datasets[n], effect) for n in shown]
+    best, there = max(tried, key=lambda one: (one[0].supported, one[0].part, one[0].delta_bic))
     having = [n for n in names if n not in open_axes]
-    made = addition(best, before.fits[best.axis], before.datasets, before.model, given)
+    base, prepared = before.fits[best.axis], {**before.datasets, best.axis: there}
+    if there is not before.datasets[best.axis]:
+        base = replace(fit_axis(base.axis, there.training), begun=base.begun)
+    made = addition(best, base, prepared, before.model, given)
     why = axis_in_words(effect.name, best.axis, names, having)
     return _with_notes(made, *read_otherwise_in_words(recording), why)
+
+
+def _attempt(base: Fit, dataset: Dataset, effect: Effect) -> tuple[Candidate, Dataset]:
+    """An effect beside a fit, and the dataset with the channel delay that it leaves."""
+    if effect.is_nonparametric:
+        return fit_nonparametric(base, dataset, effect), dataset
+    tried = effect_tried(base, dataset, effect)
+    return tried.candidate, tried.judged.dataset
 
 
 @parallel()

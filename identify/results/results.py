@@ -419,7 +419,7 @@ def addition(
     name = best.axis
     left = model.axes[name].names
     step = _step(best, base, prepared[name], shape)
-    new = model.with_axis(name, best.fit.axis).with_history(step)
+    new = model.with_axis(name, prepared[name].kept_in(best.fit.axis)).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
     moving, replayed = errors_of_both(model, new, name, prepared)
     return Addition(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Protocol
 
 import numpy as np
@@ -245,7 +245,7 @@ def control(change: Change, without: Judged, fit: Judged) -> float:
 
 
 def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
-    """The best of a first fit and of those from all other starts.
+    """The best of a first fit and of those from all other starts, in which the effect is itself.
 
     The effect was missing when the fit before was made, which distorts its values, so one start has
     those of the model as it was given.
@@ -255,7 +255,14 @@ def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
         return min([first, *(fit_axis(axis, logs) for axis in axes)], key=lambda f: f.error)
     begun = judged.fit.axis.begun_as(judged.fit.begun).with_effect(first.axis[change.name])
     fits = [first, *(fit_axis(axis, logs) for axis in (begun, *axes))]
-    return simplified(min(fits, key=lambda f: f.error), judged, change.effect)
+    return simplified(min(fits, key=partial(_rank, judged, change)), judged, change.effect)
+
+
+def _rank(judged: Judged, change: Added, fit: Fit) -> tuple[bool, float]:
+    """A law that has become another tells nothing, however much it takes."""
+    law = fit.axis[change.name]
+    other = law.effect.imitation(law.values, judged.dataset.excitation) is not None
+    return other, fit.error
 
 
 def simplified(fit: Fit, judged: Judged, effect: Effect) -> Fit:

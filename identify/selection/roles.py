@@ -36,10 +36,7 @@ def in_roles(ended: Conclusion, base: Fit, dataset: Dataset) -> Conclusion:
     if found.steps:
         final = replace(fit_axis(found.final.fit.axis, there.training), begun=base.begun)
     told = replace(found, dataset=there, base=Judged(first, there), final=Judged(final, there))
-    return replace(
-        ended, found=told, findings=_proved_as(ended.findings, told),
-        contradicted=ended.contradicted,
-    )  # fmt: skip
+    return replace(ended, found=told, findings=_proved_as(ended.findings, told))
 
 
 def _proved_as(findings: Sequence[Finding], found: Found) -> tuple[Finding, ...]:

@@ -253,23 +253,31 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
     It is refitted whatever one linear step promises; ``Candidate.refused`` says why not to keep it.
     """
+    return effect_tried(base, dataset, effect).candidate
+
+
+def effect_tried(base: Fit, dataset: Dataset, effect: Effect) -> Tried:
+    """The same with the dataset, whose channel delay may be another beside the effect.
+
+    All logs that decide prove it; its values are those of the training logs.
+    """
     before, change = together(base, dataset), Added(effect)
     if effect.is_noise:
-        return as_noise(Judged(base, dataset), effect).candidate
+        return as_noise(Judged(base, dataset), effect)
     screening = change.screen(before, ControlTest.beside(before))
     fit = change.refit(before, screening)
     if not fit.at_floor:
-        fit = fit_multistart(
-            from_all_starts(before, screening, fit).axis, before.dataset, base.begun
-        )
+        axis = from_all_starts(before, screening, fit).axis
+        fit = fit_multistart(axis, before.dataset, base.begun)
     tried = judged_change(before, screening, fit)
-    proof, axis = tried.candidate, tried.judged.fit.axis
     if before.dataset is dataset:
-        return proof
+        return tried
     there = aligned_as(tried.judged.dataset, dataset)
     given = Judged(replace(fit_axis(base.axis, there.training), begun=base.begun), there)
-    own = candidate_of(given, refitted_on(axis, given), effect, parameters(change))
-    return replace(own, score=proof.score, doubt=proof.doubt)
+    after, proof = refitted_on(tried.judged.fit.axis, given), tried.candidate
+    own = candidate_of(given, after, effect, parameters(change))
+    own = replace(own, score=proof.score, doubt=proof.doubt)
+    return replace(tried, judged=after, candidate=own)
 
 
 def reshape(
