@@ -105,6 +105,18 @@ def test_laws_are_found_before_a_free_curve_takes_both() -> None:
     assert set(found.named) == set(both)
 
 
+def test_a_law_that_became_another_is_tried_from_its_other_starts() -> None:
+    """One period near the reach follows two short ones best, and is no period any more."""
+
+    def two(x: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return 0.2 * np.sin(2 * np.pi * x / 0.012) + 0.17 * np.cos(2 * np.pi * x / 0.0071)
+
+    ride = Ride(1, 5.0, reach=0.014)
+    found = asked(SLIDE, SLIDE, few("cogging", "quadratic_drag"), two, ride)
+    assert "cogging" in found.named
+    assert not found.ranking[0].doubt
+
+
 # Whether a law that was found is itself: its exponent, its values at a bound
 
 
