@@ -31,6 +31,7 @@ from identify.cli.shared import (
     app,
     loaded,
     said_of,
+    tell_first_look,
     with_logs,
     written,
 )
@@ -152,6 +153,7 @@ def diagnose(
     from identify.output.text import diagnose_text
 
     machine, catalogue = loaded(model, effects)
+    tell_first_look(machine, [*logs, *(holdout or ())], catalogue)
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
     done = with_logs(job, machine, logs, holdout, test, fits=True)
     source = replace(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
@@ -224,6 +224,25 @@ def with_logs(
     with progress_on_stderr() as progress, heard() as silent, recorded.explaining():
         result = job(model, recorded, *rest, progress=progress)
     return Done(result, recorded.findings, list(dict.fromkeys(silent)))  # of all axes alike
+
+
+LONG = 600_000  # samples of all axes and logs, with which a diagnosis takes more than some seconds
+
+
+def tell_first_look(model: MachineModel, logs: Sequence[Path], catalogue: Catalogue) -> None:
+    """Say on standard error what the first log begins with, where all of them take long.
+
+    What is wrong with it is told with the result.
+    """
+    from identify.output.words.first_look import first_look_in_words
+    from identify.selection.first_look import first_look
+    from twin.logs.decode import samples_by_axis
+
+    with suppress(InputError), heard():
+        if sum(sum(samples_by_axis(path).values()) for path in logs) < LONG:
+            return
+        if found := first_look(model, logs[0], catalogue=catalogue):
+            typer.echo(f"twin: {first_look_in_words(str(logs[0]), found)}", err=True)
 
 
 def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Said:
