@@ -129,9 +129,11 @@ def add_found(
     made, kept = replace(after.model, history=before.model.history), True
     for axis, names in changed.items():
         if names and axis in after.fits:
-            first, last, dataset = before.fits[axis], after.fits[axis], after.datasets[axis]
+            last, dataset = after.fits[axis], after.datasets[axis]
+            # Both on one dataset: a fit chooses its test functions by what its model leaves.
+            first = fit_axis(before.fits[axis].axis, dataset.training)
             made = made.with_history(*steps_together(names, first, last, dataset))
-            gain = score(Judged(first, before.datasets[axis]), Judged(last, dataset))
+            gain = score(Judged(first, dataset), Judged(last, dataset))
             kept = kept and gain.accepted
     return AllAdded(made, before, made.history[len(given.history) :], kept)
 

@@ -18,8 +18,8 @@ IDENTIFY, TWIN = (Path(package.__file__).parent for package in (identify, twin))
 # In the order in which data pass them: a room imports only from those before it.
 ROOMS = (
     "rules", "dataset", "estimation", "analysis", "frequency", "selection", "mechanism",
-    "validation", "experiment_design", "results", "output", "workflow", "adding", "fleet", "view",
-    "testing", "demo", "cli", "start",
+    "validation", "experiment_design", "results", "project", "output", "workflow", "adding",
+    "fleet", "view", "testing", "demo", "app", "cli", "start",
 )  # fmt: skip
 TWIN_ROOMS = (
     "errors", "files", "entries", "numbers", "signals", "telling", "threads", "parallel",

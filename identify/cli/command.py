@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 from typer.core import TyperCommand
 
+from identify.cli.in_project import abandoned, filled, working
 from twin.errors import InputError, Unwritten
 from twin.files import is_same_file, require_writable
 from twin.parallel import Progress, silent
@@ -88,7 +89,10 @@ class Commands(typer.Typer):
 
             @wraps(job)
             def run(as_json: bool, **given: Any) -> int:
-                said = job(**given)
+                with working() as project:
+                    said = job(**given)
+                    if project is not None:
+                        project.keep(given, said.answer.entries(), said.fine)
                 for warning in said.warnings:
                     print(f"twin: {warning}", file=sys.stderr)
                 print(json.dumps(said.answer.entries()) if as_json else said.text)
@@ -124,9 +128,20 @@ class Command(TyperCommand):
             elif option and (count := count + 1) > 1:
                 spread.append(option)
             spread.append(arg)
-        return super().parse_args(ctx, spread)
+        try:
+            return super().parse_args(ctx, filled(self, ctx, spread))
+        except BaseException:
+            abandoned()
+            raise
 
     def invoke(self, ctx: Any) -> Any:
+        try:
+            self._require_apart(ctx)
+            return super().invoke(ctx)
+        finally:
+            abandoned()
+
+    def _require_apart(self, ctx: Any) -> None:
         outputs, inputs = {}, {}
         for param in self.params:
             given = ctx.params.get(param.name)
@@ -142,7 +157,6 @@ class Command(TyperCommand):
                 raise InputError(f"{path}: Rerun opens an .rrd file; give such a name")
             if name != FOLDER:
                 require_writable(path)
-        return super().invoke(ctx)
 
 
 def require_apart(outputs: Mapping[str, Path], inputs: Mapping[str, Any]) -> None:

@@ -17,7 +17,9 @@ from twin.errors import InputError
 
 if TYPE_CHECKING:
     from twin.importers.guess import Proposal
+    from twin.importers.mapping import ImportMap
     from twin.importers.proposal.text import Answers, Need
+    from twin.logs import Log
 
 
 @app.command("import")
@@ -37,6 +39,15 @@ def import_(
         bool, Option("--guess", help="Propose a map for FILE, with reasons, and import nothing.")
     ] = False,
     yes: Annotated[bool, Option("--yes", help="Take the proposed map without a question.")] = False,
+    entries: Annotated[
+        list[str] | None,
+        Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Entry of the map to set, as axes.x.position.unit=mm, or without a value to "
+            "remove; the map is written beside the log.",
+        ),
+    ] = None,
 ) -> Said:
     """Turn a machine's recording into an MCAP log, by a map or by one that is proposed.
 
@@ -44,6 +55,8 @@ def import_(
     """
     if guess:
         return _guess(sources, out)
+    if entries:
+        return _by_edited(sources, mapping, entries, out)
     if mapping is None:
         return _by_proposal(sources, out, yes)
     if out is None:
@@ -53,15 +66,21 @@ def import_(
 
 def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
     """A log by the map of a user, with what its signals say against it."""
+    from twin.importers import import_log, load_mapping
+
+    known = load_mapping(mapping)
+    return _logged(import_log(sources, known), known, mapping, out)
+
+
+def _logged(log: Log, known: ImportMap, mapping: Path, out: Path) -> Said:
+    """Write a log that a map made."""
     from identify.output.answers.machine import LogAnswer
     from twin.checks import check_assumed
-    from twin.importers import import_log, load_mapping, told_of
+    from twin.importers import told_of
     from twin.importers.guess import doubts_of
     from twin.importers.proposal.doubts import told_in_log
     from twin.logs import write_log
 
-    known = load_mapping(mapping)
-    log = import_log(sources, known)
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
     doubts = told_in_log(log)  # for whoever checks it later
     write_log(replace(log, metadata={**log.metadata, **doubts}), out)
@@ -73,6 +92,22 @@ def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
         *(f"{out}: warning: {finding}" for finding in unsure),
     ]
     return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
+
+
+def _by_edited(
+    sources: Sequence[Path], mapping: Path | None, entries: Sequence[str], out: Path | None
+) -> Said:
+    """A log by a map, or by the one that is proposed, with entries that the user sets."""
+    from twin.entries import toml_document
+    from twin.errors import at
+    from twin.importers.edits import with_entries
+
+    if mapping is None:
+        text = _proposal(sources, "--set without --map").map_text({})
+    else:
+        with at(str(mapping)):
+            text = toml_document(mapping)[0]
+    return _written(sources, with_entries(text, entries), out or Path(f"{sources[0].stem}.mcap"))
 
 
 def _guess(sources: Sequence[Path], out: Path | None) -> Said:
@@ -130,26 +165,41 @@ def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Said:
 
 def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: str) -> Said:
     """Write the map beside the log, and the log where the map is complete."""
-    from identify.analysis.map_proof import proofs_of
-    from identify.output.answers.machine import ImportAnswer
     from identify.output.machine import in_shell
-    from identify.output.proposal import map_answer, proof_text
-    from twin.importers import import_log, load_mapping
+    from identify.output.proposal import map_answer
 
-    mapping, text = log.with_suffix(".map.toml"), found.map_text(answers)
-    kept = _kept(mapping, text)
+    text = found.map_text(answers)
     if lacks := found.lacks(answers):
+        mapping = log.with_suffix(".map.toml")
+        kept = _kept(mapping, text)
         said = f"{mapping}: the map lacks what is marked NOT KNOWN or '?'; complete it, then"
         said += f"\n  {in_shell('import', source, '--map', mapping, '-o', log)}"
         parts = filter(None, (shown, said))
         return Said("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)
-    done = _by_map([source], mapping, log)
-    proofs = proofs_of(import_log(source, load_mapping(mapping)))
+    return _written([source], text, log, shown)
+
+
+def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> Said:
+    """Write a map beside the log that it makes, and say what it makes of each axis."""
+    from identify.analysis.map_proof import proofs_of
+    from identify.output.answers.machine import ImportAnswer
+    from identify.output.proposal import proof_text
+    from twin.errors import at
+    from twin.importers import import_log
+    from twin.importers.mapping import parse_mapping
+
+    mapping = out.with_suffix(".map.toml")
+    with at(str(mapping)):
+        known = parse_mapping(text)
+    log = import_log(sources, known)
+    kept = _kept(mapping, text)
+    done = _logged(log, known, mapping, out)
+    proofs = proofs_of(log)
     lines = [f"{mapping}: the map, to be used for other recordings of this machine", done.text]
     lines += [proof_text(axis, proof) for axis, proof in proofs.items()]
     answer = ImportAnswer.of(done.answer, map=mapping, proofs=proofs)
-    text = "\n\n".join(filter(None, (shown, "\n".join(lines))))
-    return Said(text, answer, [*kept, *done.warnings])
+    told = "\n\n".join(filter(None, (shown, "\n".join(lines))))
+    return Said(told, answer, [*kept, *done.warnings])
 
 
 def _answers(needs: Sequence[Need]) -> Answers:

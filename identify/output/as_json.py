@@ -21,6 +21,7 @@ from identify.output.answers import (
     fleet,
     frequency,
     machine,
+    project,
 )
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -63,7 +64,7 @@ def answers() -> list[type[Answer]]:
     """The class of every object that a command prints."""
     known = {
         k: v
-        for module in (machine, fits, diagnoses, frequency, fleet)
+        for module in (machine, fits, diagnoses, frequency, fleet, project)
         for k, v in vars(module).items()
     }
     return [v for k, v in known.items() if k.endswith("Answer") and v is not Answer]

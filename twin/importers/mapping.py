@@ -23,6 +23,7 @@ as many.
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -400,13 +401,18 @@ def load_mapping(path: str | Path) -> ImportMap:
     """Read a map; raises InputError naming the file, the entry and what is allowed."""
     path = Path(path)
     with reading(path):
-        text, document = toml_document(path)
-        if not document.get("axes"):
-            raise InputError("has no [axes.<name>] table; name at least one axis, as in [axes.x]")
-        mapping = read_entries(ImportMap, document)
-        mapping.require_consistent()
-        mapping._text = text
-        return mapping
+        return parse_mapping(toml_document(path)[0])
+
+
+def parse_mapping(text: str) -> ImportMap:
+    """The map of a TOML text; raises InputError naming the entry and what is allowed."""
+    document = tomllib.loads(text)
+    if not document.get("axes"):
+        raise InputError("has no [axes.<name>] table; name at least one axis, as in [axes.x]")
+    mapping = read_entries(ImportMap, document)
+    mapping.require_consistent()
+    mapping._text = text
+    return mapping
 
 
 def json_schema() -> dict[str, Any]:

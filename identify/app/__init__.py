@@ -1,0 +1,1 @@
+"""The loop in a browser: every click a command of `twin`."""

@@ -1,0 +1,152 @@
+"""What a command that ran inside a project adds to it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from identify.project.entries import (
+    AnswerEntry,
+    ErrorsEntry,
+    ExperimentEntry,
+    ExportEntry,
+    ModelEntry,
+    Project,
+    RecordingEntry,
+    RoleName,
+)
+from identify.project.folder import Folder
+from twin.files import write_atomically
+
+Given = Mapping[str, Any]
+Answer = Mapping[str, Any]
+ROLE_OF: Mapping[str, RoleName] = {"fit": "training", "holdout": "selection", "test": "test"}
+KEPT = ("diagnose", "compare", "plan", "feedforward", "frf", "check", "add", "fit", "view")
+"""Commands whose answers a project keeps."""
+
+
+def keep(folder: Folder, command: str, given: Given, answer: Answer, typed: str) -> None:
+    """Add what a command made. given: its parameters; typed: as it is outside a project."""
+    adds: list[Callable[[Project], Project]] = []
+    if command in _ADDING and (add := _ADDING[command](given, answer)):
+        adds.append(add)
+    if command in KEPT:
+        adds.append(_answered(folder, command, given, answer, typed))
+
+    def change(project: Project) -> Project:
+        for add in adds:
+            project = add(project)
+        return project
+
+    if adds:
+        folder.change(change)
+
+
+def _answered(
+    folder: Folder, command: str, given: Given, answer: Answer, typed: str
+) -> Callable[[Project], Project]:
+    """Write the answer beside its page."""
+    page = given.get("html")
+    name = Path(page).with_suffix(".json") if page else None
+    name = name or folder.free_name("answers", f"{{}}-{command}.json")
+    write_atomically(folder.root / name, json.dumps(answer).encode())
+    about = given.get("model")
+    entry = AnswerEntry(
+        command=typed, file=str(name), page=None if page is None else str(page),
+        model=None if about is None else str(about),
+    )  # fmt: skip
+    return lambda project: _more(project, "answers", entry)
+
+
+def _more(project: Project, kind: str, entry: Any) -> Project:
+    return project.model_copy(update={kind: [*getattr(project, kind), entry]})
+
+
+Adding = Callable[[Given, Answer], Callable[[Project], Project] | None]
+
+
+def _import(given: Given, answer: Answer) -> Callable[[Project], Project] | None:
+    log, sources = answer.get("log"), [str(path) for path in given["sources"]]
+    if log is None:  # only a map, or less
+        return None
+
+    def change(project: Project) -> Project:
+        old = [r for r in project.recordings if r.sources == sources]
+        entry = RecordingEntry(
+            file=log, role=old[0].role if old else project.next_role(), sources=sources,
+            map=answer.get("map") or _text(given.get("mapping")),
+        )  # fmt: skip
+        if not old:
+            return _more(project, "recordings", entry)
+        changed = [entry if r is old[0] else r for r in project.recordings]
+        return project.model_copy(update={"recordings": changed})
+
+    return change
+
+
+def _text(path: object) -> str | None:
+    return None if path is None else str(path)
+
+
+def _new(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    return lambda project: _more(project, "models", ModelEntry(file=answer["model"]))
+
+
+def _fit(given: Given, answer: Answer) -> Callable[[Project], Project] | None:
+    if given.get("out") is None:
+        return None
+    entry = ModelEntry(
+        file=str(given["out"]), base=given["model"], change=["fit"], errors=[*_fitted(answer)]
+    )
+    return lambda project: _more(project, "models", entry)
+
+
+def _fitted(answer: Answer) -> Iterator[ErrorsEntry]:
+    for axis, found in answer["axes"].items():
+        errors = (found.get("force_error"), found.get("holdout_force_error"),
+                  found.get("test_force_error"))  # fmt: skip
+        for role, after in zip(ROLE_OF.values(), errors, strict=True):
+            if after is not None:
+                yield ErrorsEntry(axis=axis, role=role, after=after, unit=found["unit"])
+
+
+def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    steps = answer.get("steps") or [answer]
+    bodies = [body["body"] for body in answer.get("bodies", ())]
+    changes = [step["effect"] for step in steps if "effect" in step]
+    errors = {step["axis"]: step for step in steps if "axis" in step}
+    entry = ModelEntry(
+        file=str(given["out"]), base=given["model"], change=[*dict.fromkeys(changes), *bodies],
+        proved=answer.get("kept", True),
+        errors=[e for step in errors.values() for e in _of_step(step)],
+    )  # fmt: skip
+    return lambda project: _more(project, "models", entry)
+
+
+def _of_step(step: Answer) -> Iterator[ErrorsEntry]:
+    for prefix, role in ROLE_OF.items():
+        after = step.get(f"{prefix}_error_after")
+        if after is not None:
+            before = step.get(f"{prefix}_error_before")
+            yield ErrorsEntry(
+                axis=step["axis"], role=role, after=after, before=before, unit=step["unit"]
+            )
+
+
+def _plan(given: Given, answer: Answer) -> Callable[[Project], Project] | None:
+    file = answer.get("file")
+    if file is None:
+        return None
+    return lambda project: _more(project, "experiments", ExperimentEntry(file=file))
+
+
+def _export(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    entry = ExportEntry(format=answer["format"], files=answer["files"])
+    return lambda project: _more(project, "exports", entry)
+
+
+_ADDING: Mapping[str, Adding] = {
+    "import": _import, "new": _new, "fit": _fit, "add": _add, "plan": _plan, "export": _export,
+}  # fmt: skip
