@@ -40,7 +40,9 @@ def watch(
     serve: Annotated[
         int | None,
         Option(
-            metavar="PORT", min=0, max=65535,
+            metavar="PORT",
+            min=0,
+            max=65535,
             help="Serve residual, parameters and alarms at ws://127.0.0.1:PORT, for Foxglove; 0: "
             "at any port that is free.",
         ),

@@ -25,6 +25,7 @@ from twin.signals import Array
 
 PRIOR = 0.5  # of a parameter: how far it may be from the fitted one without any log
 MEMORY = 60.0  # windows of the usual way, over which a window fades to 1 / e: about a minute
+LEAST = 1e-15  # N, so that no noise is none
 TO_BAND = 1.645  # half a 90 % band over its standard deviation
 
 
@@ -56,20 +57,22 @@ class Recursion:
         """Of each parameter one standard deviation of its prior (p,)."""
         return PRIOR * np.abs(read(self.axis, self.where))
 
-    def take(
-        self, logs: Sequence[PreparedLog], left: Array, some: Array, way: float, noise: float
-    ) -> None:
+    def take(self, logs: Sequence[PreparedLog], left: Array, some: Array, way: float) -> None:
         """Add a window.
 
         left (n,): residual of the fitted model, N, in these test functions; some (n,): which of
-        them count; way: travelled in the window, m or rad; noise: usual residual, N RMS.
+        them count; way: travelled in the window, m or rad. One with fewer of them than parameters
+        says nothing.
         """
-        if not self.where or not some.any():
+        seen, free = left[some], np.count_nonzero(some) - len(self.where)
+        if not self.where or free <= 0:
             return
-        seen = left[some]
-        # As many of them are worth as if each were by itself: neighbours overlap.
-        weight = np.sqrt(effective_samples(seen) / len(seen)) / noise
         columns = jacobian(self.axis, logs, self.where)[some] * self.scale
+        basis = np.linalg.qr(columns)[0]
+        noise = seen - basis @ (basis.T @ seen)  # what no value of them takes away
+        # Neighbours overlap: as many are counted as there would be of independent ones.
+        size = max(float(np.linalg.norm(noise)) / np.sqrt(free), LEAST)
+        weight = np.sqrt(effective_samples(noise) / len(seen)) / size
         kept = np.exp(-0.5 * way / (MEMORY * self._usual(way)))
         old = np.column_stack([self.root, self.aim]) * kept
         new = np.column_stack([columns, -seen]) * weight

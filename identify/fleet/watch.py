@@ -13,8 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from identify.dataset.preparation import datasets
+from identify.dataset.bodies import bodies_along
+from identify.dataset.given_logs import is_driven, telling_in
+from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.readings import ripples_of_widest
+from identify.dataset.test_function import LEAST_BLOCKS
 from identify.estimation.force_balance import residual
 from identify.fleet.alarms import DEAD_ERROR
 from identify.fleet.change_point import AFTER, BEFORE, changes
@@ -36,6 +40,7 @@ LEVEL = 5.0  # of the test: 4 false changes in a million windows, before the dea
 LEAST = 1e-15  # N, so that no error is none: their ratios are compared
 KEPT = 200  # windows that are compared with
 AGAIN = 0.25  # s between two looks at the file
+WINDOW_NAME = "window"  # of its log
 
 
 class Source(Protocol):
@@ -73,6 +78,7 @@ class Watcher:
     errors: dict[str, list[float]] = field(default_factory=dict)
     ends: dict[str, list[float]] = field(default_factory=dict)
     slow: dict[str, Recursion] = field(default_factory=dict)
+    ripples: dict[str, tuple[float, ...]] = field(default_factory=dict)
     windows: int = 0
     past: Log | None = None
     then: float = 0.0
@@ -103,16 +109,31 @@ class Watcher:
         for name, axis in self.model.axes.items():
             if name not in log.axes:
                 continue
-            alone = MachineModel(self.model.name, {name: axis}, log.sample_rate)
             try:
                 with heard(), parallel(1):
-                    logs = datasets(alone, {"window": log}, {}, LENGTH)[name].training
+                    logs = [self._prepared(name, log)]
                     left, some = residual(axis, logs), moving(logs, sticks(axis))
                     some[: round((1.0 - share) * len(left))] = False
                     if some.any():
                         yield self._told(name, logs, left, some, share)
             except InputError:
                 continue
+
+    def _prepared(self, name: str, log: Log) -> PreparedLog:
+        """An axis in a log. Raises InputError where it tells nothing.
+
+        The encoder's own periods are sought once: to seek them takes as long as all else.
+        """
+        machine, driven = tuple(self.model.axes), is_driven(self.model.axes[name])
+        if not telling_in({WINDOW_NAME: log}, name, machine, driven=driven)[0]:
+            raise InputError(f"axis {name} is at rest")
+        if name not in self.ripples:
+            self.ripples[name] = ripples_of_widest([log], name)
+        bodies = bodies_along(self.model, log, WINDOW_NAME).get(name)
+        motion = motion_of(
+            log, name, WINDOW_NAME, machine, LENGTH / LEAST_BLOCKS, self.ripples[name], bodies
+        )
+        return PreparedLog.of(motion, LENGTH)
 
     def _told(
         self, name: str, logs: Sequence[PreparedLog], left: Array, some: Array, share: float
@@ -124,7 +145,7 @@ class Watcher:
         slow = self.slow.setdefault(name, Recursion.of(axis))
         place = logs[0].motion.position
         way = float(np.abs(np.diff(place[round((1.0 - share) * len(place)) :])).sum())
-        slow.take(logs, left, some, way, usual or error)
+        slow.take(logs, left, some, way)
         log = logs[0]
         time = self.then - log.motion.time[-1] + log.time[some]
         return LiveAxis(name, axis.units.force, time, left[some], error, usual, slow.told())

@@ -13,6 +13,7 @@ import importlib
 import json
 import struct
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,12 +49,6 @@ class _Arriving:
     last: int = 0
     count: int = 0
 
-    def take(self) -> tuple[Array, list[bytes]]:
-        """All of them, which are held no longer."""
-        times, payloads = np.array(self.times, dtype=np.int64), self.payloads
-        self.times, self.payloads = [], []
-        return times, payloads
-
 
 class LiveTopics:
     """Follows the axes that a server at ``ws://...`` has topics of.
@@ -68,6 +63,7 @@ class LiveTopics:
         """Connect. Raises InputError where nobody answers, or without the extra ``live``."""
         self.address, self.fields = address, fields
         self.told: list[str] = []
+        self._open = ExitStack()
         self._socket: Any = None
         self._begin()
         self._client = _client()
@@ -86,15 +82,16 @@ class LiveTopics:
 
     def _connect(self) -> None:
         # Whoever serves does not wait, and what is not taken from it is lost: the queue has no end.
-        self._socket = self._client.sync.client.connect(
+        connection = self._client.sync.client.connect(
             self.address, subprotocols=PROTOCOLS, open_timeout=PATIENCE, max_queue=None,
             max_size=None, compression=None,
         )  # fmt: skip
+        self._socket = self._open.enter_context(connection)
 
     def close(self) -> None:
         """Leave the server."""
-        if self._socket is not None:
-            self._socket.close()
+        self._open.close()
+        self._socket = None
 
     def windows(self, length: float) -> Iterator[tuple[float, Log]]:
         """The whole windows of that length (s) that have come, each with its time in s.
@@ -102,10 +99,15 @@ class LiveTopics:
         Raises InputError where the topics are none of a machine.
         """
         self._receive()
-        for channel, arriving in self._arriving.items():
-            if self._knows_rate(channel, arriving):
-                self._pass_on(channel, arriving)
-        yield from self._incoming.whole(length)
+        broken: Sequence[_Arriving] | None = None
+        while broken is None or broken:
+            for channel, arriving in self._arriving.items():
+                if self._knows_rate(channel, arriving):
+                    self._pass_on(channel, arriving)
+            yield from self._incoming.whole(length)
+            broken = [a for a in self._arriving.values() if a.count and a.times]
+            for arriving in broken:
+                self._break(arriving)
 
     def _receive(self) -> None:
         """Take all that has come by now; come back to a server that has come back."""
@@ -121,7 +123,7 @@ class LiveTopics:
         except (OSError, errors.WebSocketException):
             if self._socket is not None:
                 self.told.append(f"{self.address}: the connection was lost")
-                self._socket = None
+                self.close()
                 self._begin()
 
     def _take(self, message: str | bytes) -> None:
@@ -182,28 +184,31 @@ class LiveTopics:
         return bool(arriving.times)
 
     def _pass_on(self, channel: int, arriving: _Arriving) -> None:
-        """Give the samples on, evenly: each takes the time of its number."""
-        times, payloads = arriving.take()
-        rate, size = arriving.topic.sample_rate, len(times)
-        before = np.concatenate([[arriving.last if arriving.count else times[0]], times[:-1]])
-        steps = np.rint((times - before) * 1e-9 * rate).astype(np.int64)
-        if not arriving.count:
-            arriving.first, steps[0] = int(times[0]), 1
-        ends = sorted({0, *np.flatnonzero(steps != 1).tolist(), size})
-        for begin, end in zip(ends[:-1], ends[1:], strict=True):
-            if steps[begin] != 1:
-                self._breaks(arriving, before[begin], times[begin])
-            self._give(channel, arriving, payloads[begin:end])
-        arriving.last = int(times[-1])
+        """Give the samples on up to the first that does not follow; each takes its number's time.
 
-    def _breaks(self, arriving: _Arriving, before: int, now: int) -> None:
+        They follow by the time since the one before, so that a clock may be a little fast.
+        """
+        times, rate = np.array(arriving.times, dtype=np.int64), arriving.topic.sample_rate
+        if not arriving.count:
+            arriving.first = int(times[0])
+            arriving.last = int(times[0] - 1e9 / rate)
+        steps = np.rint(np.diff(times, prepend=arriving.last) * 1e-9 * rate)
+        end = int(np.argmax(steps != 1)) if (steps != 1).any() else len(times)
+        if end:
+            arriving.last = int(times[end - 1])
+            self._give(channel, arriving, arriving.payloads[:end])
+        del arriving.times[:end], arriving.payloads[:end]
+
+    def _break(self, arriving: _Arriving) -> None:
+        """Begin anew with a sample that does not follow."""
+        before, now = arriving.last, arriving.times[0]
         what = "a gap" if now > before else "its clock jumps"
         self.told.append(
             f"{self.address}: {arriving.topic.name}: {what}: {seconds(before)} is followed by "
             f"{seconds(now)}"
         )
         self._incoming.drop()
-        arriving.first, arriving.count = int(now), 0
+        arriving.count = 0
 
     def _give(self, channel: int, arriving: _Arriving, payloads: Sequence[bytes]) -> None:
         count = len(payloads)
