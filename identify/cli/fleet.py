@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -215,40 +214,3 @@ def kind(
     answer = KindAnswer.of(kind=given.name, machine=machine, parameters=list(told), model=out)
     said = Said(kind_in_words(given.name, told, machine), answer, contents.faults)
     return replace(said, unwritten=failed)
-
-
-@app.command()
-def watch(
-    log: Annotated[Path, Argument(metavar="LOG", help="MCAP log, also one being written.")],
-    model: Annotated[str, Argument(metavar="MODEL", help="Machine model (.toml), fitted.")],
-    patience: Annotated[
-        float, Option(min=0.0, help="After so many s without anything new it ends.")
-    ] = 10.0,
-    effects: Effects = None,
-) -> Said:
-    """Follow a log while it is written, and tell when the force error of the model changes.
-
-    It ends when the writer has closed the log, with exit code 1 where there was an alarm.
-
-    Example: twin watch run.mcap.unfinished fitted.toml
-    """
-    from identify.cli.shared import MEASURED, loaded
-    from identify.fleet.watch import Watcher
-    from identify.fleet.watch import watch as run
-    from identify.output.answers.fleet import WatchAnswer
-    from identify.output.words.fleet import live_in_words
-    from twin.logs.follow import Follower
-
-    if not log.is_file():
-        raise InputError(f"{log}: is no file; give the log that is being written")
-    follower, watcher = Follower(log, MEASURED), Watcher(loaded(model, effects)[0])
-    alarms = []
-    for alarm in run(follower, watcher, patience=patience):
-        alarms.append(alarm)
-        print(f"twin: {live_in_words(alarm)}", file=sys.stderr, flush=True)
-    text = f"{log}: {watcher.windows} windows, {len(alarms)} alarms"
-    lines = [text, *(live_in_words(alarm) for alarm in alarms)]
-    answer = WatchAnswer.of(
-        log=log, windows=watcher.windows, ended=follower.ended, alarms=alarms, told=follower.told
-    )
-    return Said("\n".join(lines), answer, follower.told, fine=not alarms)

@@ -6,24 +6,30 @@ the force error has changed, with the machine's own first windows for what is us
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from time import monotonic, sleep
+from typing import Protocol
 
 import numpy as np
 
-from identify.dataset.preparation import datasets
-from identify.dataset.prepared_log import moving, sticks
+from identify.dataset.bodies import bodies_along
+from identify.dataset.given_logs import is_driven, telling_in
+from identify.dataset.motion import motion_of
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
+from identify.dataset.readings import ripples_of_widest
+from identify.dataset.test_function import LEAST_BLOCKS
 from identify.estimation.force_balance import residual
 from identify.fleet.alarms import DEAD_ERROR
-from identify.fleet.change_point import BEFORE, changes
-from identify.results.fleet import LiveAlarm
+from identify.fleet.change_point import AFTER, BEFORE, changes
+from identify.fleet.recursion import Recursion
+from identify.results.fleet import LiveAlarm, LiveAxis
 from twin.errors import InputError
 from twin.logs import Log
-from twin.logs.follow import Follower
 from twin.logs.log import joined, thinned
 from twin.model.machine import MachineModel
 from twin.parallel import parallel
+from twin.signals import Array
 from twin.telling import heard
 
 WINDOW = 1.0  # s
@@ -34,6 +40,31 @@ LEVEL = 5.0  # of the test: 4 false changes in a million windows, before the dea
 LEAST = 1e-15  # N, so that no error is none: their ratios are compared
 KEPT = 200  # windows that are compared with
 AGAIN = 0.25  # s between two looks at the file
+WINDOW_NAME = "window"  # of its log
+
+
+class Source(Protocol):
+    """Where windows come from: a file that grows, or topics of a server."""
+
+    ended: bool
+    told: list[str]
+
+    def windows(self, length: float) -> Iterator[tuple[float, Log]]:
+        """The whole windows of that length (s) that are there by now, with their times."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """What a window told: of each axis that moved, the alarms after it, and its samples.
+
+    log: at about ``RATE``; end: s.
+    """
+
+    end: float
+    log: Log
+    axes: tuple[LiveAxis, ...] = ()
+    alarms: tuple[LiveAlarm, ...] = ()
 
 
 @dataclass
@@ -46,12 +77,14 @@ class Watcher:
     model: MachineModel
     errors: dict[str, list[float]] = field(default_factory=dict)
     ends: dict[str, list[float]] = field(default_factory=dict)
+    slow: dict[str, Recursion] = field(default_factory=dict)
+    ripples: dict[str, tuple[float, ...]] = field(default_factory=dict)
     windows: int = 0
     past: Log | None = None
     then: float = 0.0
 
-    def take(self, start: float, log: Log) -> Iterator[LiveAlarm]:
-        """The alarms of a window that begins at a time, s. An axis at rest tells nothing."""
+    def take(self, start: float, log: Log) -> Window:
+        """What a window tells that begins at a time, s. An axis at rest tells nothing."""
         self.windows += 1
         new = thinned(log, max(int(log.sample_rate / RATE), 1))
         follows = self.past is not None and abs(start - self.then) < new.period
@@ -60,40 +93,71 @@ class Watcher:
         history = round(HISTORY * new.sample_rate)
         self.past = known.part(max(len(known) - history, 0), len(known)).copied()
         if len(known) < history + len(new):
-            return
-        for axis, error in self._errors(known, len(new) / len(known)):
-            errors, ends = (of.setdefault(axis, []) for of in (self.errors, self.ends))
-            errors.append(error)
+            return Window(self.then, new)
+        axes, alarms = list[LiveAxis](), list[LiveAlarm]()
+        for told in self._axes(known, len(new) / len(known)):
+            axes.append(told)
+            errors, ends = (of.setdefault(told.axis, []) for of in (self.errors, self.ends))
+            errors.append(told.error)
             ends.append(self.then)
-            alarm = self._asked(axis)
-            if alarm is not None:
-                yield alarm
+            alarms += self._asked(told.axis)
             del errors[:-KEPT], ends[:-KEPT]
+        return Window(self.then, new, tuple(axes), tuple(alarms))
 
-    def _errors(self, log: Log, share: float) -> Iterator[tuple[str, float]]:
-        """By axis the RMS force error of the model as it is in the last share of a log, N."""
-        for axis, own in self.model.axes.items():
-            if axis not in log.axes:
+    def _axes(self, log: Log, share: float) -> Iterator[LiveAxis]:
+        """The axes of the model that move in the last share of a log."""
+        for name, axis in self.model.axes.items():
+            if name not in log.axes:
                 continue
-            alone = MachineModel(self.model.name, {axis: own}, log.sample_rate)
             try:
                 with heard(), parallel(1):
-                    found = datasets(alone, {"window": log}, {}, LENGTH)[axis].training
+                    logs = [self._prepared(name, log)]
+                    left, some = residual(axis, logs), moving(logs, sticks(axis))
+                    some[: round((1.0 - share) * len(left))] = False
+                    if some.any():
+                        yield self._told(name, logs, left, some, share)
             except InputError:
                 continue
-            left, moves = residual(own, found), moving(found, sticks(own))
-            first = round((1.0 - share) * len(left))
-            seen = left[first:][moves[first:]]
-            if len(seen):
-                yield axis, max(float(np.sqrt(np.mean(seen**2))), LEAST)
 
-    def _asked(self, axis: str) -> LiveAlarm | None:
+    def _prepared(self, name: str, log: Log) -> PreparedLog:
+        """An axis in a log. Raises InputError where it tells nothing.
+
+        The encoder's own periods are sought once: to seek them takes as long as all else.
+        """
+        machine, driven = tuple(self.model.axes), is_driven(self.model.axes[name])
+        if not telling_in({WINDOW_NAME: log}, name, machine, driven=driven)[0]:
+            raise InputError(f"axis {name} is at rest")
+        if name not in self.ripples:
+            self.ripples[name] = ripples_of_widest([log], name)
+        bodies = bodies_along(self.model, log, WINDOW_NAME).get(name)
+        motion = motion_of(
+            log, name, WINDOW_NAME, machine, LENGTH / LEAST_BLOCKS, self.ripples[name], bodies
+        )
+        return PreparedLog.of(motion, LENGTH)
+
+    def _told(
+        self, name: str, logs: Sequence[PreparedLog], left: Array, some: Array, share: float
+    ) -> LiveAxis:
+        """An axis by its residual (n,) N in these test functions, of which some (n,) count."""
+        axis, errors = self.model.axes[name], self.errors.get(name, [])
+        error = max(float(np.sqrt(np.mean(left[some] ** 2))), LEAST)
+        usual = float(np.median(errors)) if len(errors) >= AFTER else None
+        slow = self.slow.setdefault(name, Recursion.of(axis))
+        place = logs[0].motion.position
+        way = float(np.abs(np.diff(place[round((1.0 - share) * len(place)) :])).sum())
+        slow.take(logs, left, some, way)
+        log = logs[0]
+        time = self.then - log.motion.time[-1] + log.time[some]
+        return LiveAxis(name, axis.units.force, time, left[some], error, usual, slow.told())
+
+    def _asked(self, axis: str) -> list[LiveAlarm]:
+        """The alarm of an axis, where its force error has changed."""
         errors, ends = self.errors[axis], self.ends[axis]
         if len(errors) <= BEFORE:
-            return None
+            return []
         told = changes(np.log(errors), np.zeros(len(errors)), DEAD_ERROR, LEVEL)
         if not told:
-            return None
+            return []
         first = told[-1].first
         before, after = (float(np.sqrt(np.mean(np.square(part)))) for part in
                          (errors[:first], errors[first:]))  # fmt: skip
@@ -101,20 +165,20 @@ class Watcher:
             axis, ends[-1], ends[first - 1], before, after, self.model.axes[axis].units.force
         )
         del errors[:first], ends[:first]  # what is usual from now on
-        return alarm
+        return [alarm]
 
 
 def watch(
-    follower: Follower, watcher: Watcher, seconds: float = WINDOW, patience: float = 10.0
-) -> Iterator[LiveAlarm]:
-    """The alarms of a log that is being written, as they come, until its writer has closed it.
+    source: Source, watcher: Watcher, seconds: float = WINDOW, patience: float = 10.0
+) -> Iterator[Window]:
+    """The windows of a machine that runs, as they come, until its writer has closed the log.
 
     patience: s without anything new after which it ends too. Raises InputError.
     """
     last = monotonic()
-    while not follower.ended and monotonic() - last < patience:
-        for start, log in follower.windows(seconds):
+    while not source.ended and monotonic() - last < patience:
+        for start, log in source.windows(seconds):
             last = monotonic()
-            yield from watcher.take(start, log)
-        if not follower.ended:
+            yield watcher.take(start, log)
+        if not source.ended:
             sleep(AGAIN)

@@ -198,3 +198,52 @@ class LiveAlarm:
     before: float
     after: float
     unit: str
+
+
+@dataclass(frozen=True)
+class LiveParameter:
+    """A parameter of a machine that runs: its value now and half its 90 % band, beside the fitted.
+
+    name: of effect and parameter, as lugre.Fc, or mass.
+    """
+
+    name: str
+    value: float
+    half: float
+    fitted: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class LiveAxis:
+    """An axis in a window of a machine that runs.
+
+    time (n,): s; residual (n,): of the model, in ``unit``; error: its RMS. usual: RMS that was
+    usual before; None as long as it is not known. parameters: the slow ones, as they are now.
+    """
+
+    axis: str
+    unit: str
+    time: Array
+    residual: Array
+    error: float
+    usual: float | None
+    parameters: tuple[LiveParameter, ...]
+
+    @property
+    def band(self) -> float | None:
+        """Half the band within which 90 % of the residual usually lies."""
+        return None if self.usual is None else 1.645 * self.usual
+
+
+@dataclass(frozen=True)
+class LiveCause:
+    """What a diagnosis of the minutes after an alarm names; none where it found nothing.
+
+    failed: why there is none, in words; "" where there is one.
+    """
+
+    axis: str
+    changed: float
+    named: tuple[str, ...]
+    failed: str = ""

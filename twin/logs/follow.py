@@ -47,8 +47,63 @@ class _Stretch:
         return len(next(iter(self.columns.values()), ()))
 
 
+class Incoming:
+    """The samples of all topics of a log as they come. Only what no window has had yet is held."""
+
+    def __init__(self, fields: Sequence[str] | None = None) -> None:
+        self.topics, self.extras = Topics(), Extras()
+        self._fields = fields
+        self._held: dict[int, _Stretch] = {}
+
+    def take(self, data: bytes) -> None:
+        """The records of a chunk. Raises InputError where they do not follow those before.
+
+        Then what is held is dropped, and what comes next is a beginning.
+        """
+        try:
+            for block in self.topics.blocks(data):
+                self._append(block)
+        except InputError:
+            self.drop()
+            raise
+
+    def drop(self) -> None:
+        """Hold nothing of what was there."""
+        self._held.clear()
+
+    def _append(self, block: Block) -> None:
+        topic = self.topics.topic(block.channel)
+        if topic is None or topic.is_truth:
+            return
+        held = self._held.get(block.channel)
+        if held is None:
+            held = _Stretch(Series(topic, 0, self._fields), int(block.log_time[0]), {})
+            self._held[block.channel] = held
+        held.series.append(block)
+        new = held.series.taken()
+        held.columns = {n: np.concatenate([held.columns.get(n, c[:0]), c]) for n, c in new.items()}
+
+    def whole(self, length: float) -> Iterator[tuple[float, Log]]:
+        """The windows of a length (s) of which all topics have all samples, with their times."""
+        expected = [c for c in self.topics.channels if self._is_wanted(c)]
+        while self._held and all(c in self._held for c in expected):
+            start = max(held.start for held in self._held.values())
+            for held in self._held.values():  # behind a gap not all begin at once
+                held.take(round((start - held.start) * 1e-9 * held.series.rate))
+            counts = {c: round(length * h.series.rate) for c, h in self._held.items()}
+            if any(len(self._held[c]) < count for c, count in counts.items()):
+                return
+            parts = [(h.series.topic, h.take(counts[c])) for c, h in sorted(self._held.items())]
+            rate = next(iter(self._held.values())).series.rate
+            yield start * 1e-9, assembled(parts, rate, self.extras)
+
+    def _is_wanted(self, channel: int) -> bool:
+        topic: Topic | None = self.topics.topic(channel)
+        return topic is not None and not topic.is_truth
+
+
 class Follower:
-    """Follows a file whose writer appends to it. Only what no window has had yet is held.
+    """Follows a file whose writer appends to it.
 
     told: what was lost on the way, a line each: a torn chunk, a gap, a clock that jumps, a writer
     that begins anew. ended: whether the writer has closed the file.
@@ -61,11 +116,10 @@ class Follower:
 
     def _begin(self, file: tuple[int, int] | None) -> None:
         self._file, self._offset, self.ended = file, len(MAGIC), False
-        self._topics, self._extras = Topics(), Extras()
-        self._held: dict[int, _Stretch] = {}
+        self._incoming = Incoming(self.fields)
 
-    def windows(self, seconds: float) -> Iterator[tuple[float, Log]]:
-        """The whole windows that are there by now, each with the time (s) at which it begins.
+    def windows(self, length: float) -> Iterator[tuple[float, Log]]:
+        """The whole windows of a length (s) that are there by now, each with its time in s.
 
         Raises InputError where the file is no log, or goes on in no way that can be read.
         """
@@ -74,7 +128,7 @@ class Follower:
                 self._look(stream)
                 for record in self._records(stream):
                     self._take(record)
-                    yield from self._whole(seconds)
+                    yield from self._incoming.whole(length)
         except FileNotFoundError:
             return  # its writer has not begun, or begins anew
 
@@ -112,46 +166,14 @@ class Follower:
 
     def _take(self, record: Record) -> None:
         if record.opcode in IN_CHUNKS:
-            self._topics.register(record.opcode, record.content)
+            self._incoming.topics.register(record.opcode, record.content)
         elif record.opcode == Opcode.METADATA:
-            self._extras.add(record)
+            self._incoming.extras.add(record)
         elif record.opcode == Opcode.DATA_END:
             self.ended = True
         elif record.opcode == Opcode.CHUNK:
             try:
-                data, _ = open_chunk(record, Inflation(len(record.content)))
-                for block in self._topics.blocks(data):
-                    self._append(block)
+                self._incoming.take(open_chunk(record, Inflation(len(record.content)))[0])
             except InputError as error:
                 self.told.append(f"{self.path}: {error}; what was held of it is left out")
-                self._held.clear()
-
-    def _append(self, block: Block) -> None:
-        topic = self._topics.topic(block.channel)
-        if topic is None or topic.is_truth:
-            return
-        held = self._held.get(block.channel)
-        if held is None:
-            held = _Stretch(Series(topic, 0, self.fields), int(block.log_time[0]), {})
-            self._held[block.channel] = held
-        held.series.append(block)
-        new = held.series.taken()
-        held.columns = {n: np.concatenate([held.columns.get(n, c[:0]), c]) for n, c in new.items()}
-
-    def _whole(self, seconds: float) -> Iterator[tuple[float, Log]]:
-        """The windows of which all topics have all samples."""
-        expected = [c for c in self._topics.channels if self._is_wanted(c)]
-        while self._held and all(c in self._held for c in expected):
-            start = max(held.start for held in self._held.values())
-            for held in self._held.values():  # behind a gap not all begin at once
-                held.take(round((start - held.start) * 1e-9 * held.series.rate))
-            counts = {c: round(seconds * h.series.rate) for c, h in self._held.items()}
-            if any(len(self._held[c]) < count for c, count in counts.items()):
-                return
-            parts = [(h.series.topic, h.take(counts[c])) for c, h in sorted(self._held.items())]
-            rate = next(iter(self._held.values())).series.rate
-            yield start * 1e-9, assembled(parts, rate, self._extras)
-
-    def _is_wanted(self, channel: int) -> bool:
-        topic: Topic | None = self._topics.topic(channel)
-        return topic is not None and not topic.is_truth
+                self._incoming.drop()

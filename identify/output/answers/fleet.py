@@ -142,11 +142,35 @@ class LiveAlarmEntry(Entry):
     unit: str
 
 
-class WatchAnswer(Answer):
-    """What `twin watch` prints in the end; ended: whether the writer has closed the log."""
+class LiveCauseEntry(Entry):
+    """What a diagnosis of the time after an alarm named; failed: why there is none, or empty."""
 
-    log: File
+    axis: str
+    changed: Number
+    named: list[str]
+    failed: str
+
+
+class LiveParameterEntry(Entry):
+    """A slow parameter in the end: its value, half its 90 % band, and the fitted value."""
+
+    name: str
+    value: Number
+    half: Number
+    fitted: Number
+    unit: str
+
+
+class WatchAnswer(Answer):
+    """What `twin watch` prints in the end; ended: whether the writer has closed the log.
+
+    log: the file or the address that was followed. parameters: by axis, as they are in the end.
+    """
+
+    log: str
     windows: int
     ended: bool
     alarms: list[LiveAlarmEntry]
+    causes: list[LiveCauseEntry]
+    parameters: dict[str, list[LiveParameterEntry]]
     told: list[str]

@@ -13,6 +13,8 @@ from identify.results.fleet import (
     Ingested,
     KindParameter,
     LiveAlarm,
+    LiveCause,
+    LiveParameter,
     MachineState,
     Off,
     Told,
@@ -134,3 +136,16 @@ def live_in_words(alarm: LiveAlarm) -> str:
         f"force error of axis {alarm.axis} {'rose' if alarm.after > alarm.before else 'fell'} from "
         f"{errors} since {alarm.changed:.1f} s, told at {alarm.time:.1f} s"
     )
+
+
+def cause_in_words(cause: LiveCause) -> str:
+    """What a diagnosis of the minutes after an alarm came to."""
+    since = f"axis {cause.axis}, since {cause.changed:.1f} s"
+    if cause.failed:
+        return f"{since}: is not diagnosed: {cause.failed}"
+    return f"{since}: a diagnosis names {listed(cause.named) if cause.named else 'no effect'}"
+
+
+def parameter_in_words(one: LiveParameter) -> str:
+    """A parameter as it is now, beside what was fitted."""
+    return f"{with_band(one.value, one.half, one.unit)} (fitted {quantity(one.fitted, one.unit)})"

@@ -59,7 +59,7 @@ def test_the_windows_of_a_growing_file_are_those_of_the_whole(log, tmp_path) -> 
 def test_a_change_of_five_floors_is_told_within_five_seconds_and_no_other(log) -> None:
     watcher, changed, alarms = Watcher(MODEL), spoilt(log, 5.0 * FLOOR), []
     for i in range(int(SECONDS)):
-        alarms += watcher.take(float(i), changed.part(1000 * i, 1000 * (i + 1)))
+        alarms += watcher.take(float(i), changed.part(1000 * i, 1000 * (i + 1))).alarms
     (alarm,) = alarms
     assert SINCE < alarm.time <= SINCE + 5.0
     assert abs(alarm.changed - SINCE) <= 1.0
