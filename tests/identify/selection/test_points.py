@@ -173,6 +173,7 @@ def test_rounding_is_named_beside_noise_that_no_sensor_makes() -> None:
     assert found.named == ("encoder_quantization",)
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
     reason="where no law of an offset is in the catalogue, a free curve of the friction makes room "
@@ -323,6 +324,7 @@ def test_of_coloured_noise_alone_nothing_is_missing_over_a_floor_of_its_size(pol
 # 10. Several hidden effects, and viscous friction alone.
 
 
+@pytest.mark.slow
 def test_both_of_two_hidden_effects_are_named() -> None:
     """Friction that warms behind a hysteresis takes next to nothing of what both leave."""
     true = having(SLIDE, "presliding_hysteresis", reach=0.004, f0=0.05, f1=0.03, f2=0.02, f3=0.01)
