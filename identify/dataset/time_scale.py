@@ -67,19 +67,27 @@ def choose_length(
     motions_at: these by role for test functions of a length, whose blocks are short enough for it;
     for None as long as their noise asks for. imposed: whether there is no mass.
     """
-    motions = [m for some in motions_at(None) for m in some]
+    motions = _each(motions_at, None)
     chosen = choose_test_function(motions, imposed=imposed)
     shorter = [length for length in TEST_FUNCTIONS if length < chosen]
     if imposed or not shorter:
         return chosen
-    quiet = AtLength.of(chosen, motions)
+    quiet = [AtLength.of(chosen, [m]) for m in motions]
     for length in shorter:
-        finer = [m for some in motions_at(length) for m in some]
+        finer = _each(motions_at, length)
         if length < LEAST_BLOCKS * max(m.period for m in finer):
             continue
-        if AtLength.of(length, finer).shows_more_than(quiet):
+        # What one log shows is there, though another one excites it little.
+        pairs = zip(finer, quiet, strict=True)
+        if any(AtLength.of(length, [m]).shows_more_than(own) for m, own in pairs):
             return length
     return chosen
+
+
+def _each(
+    motions_at: Callable[[float | None], tuple[Motions, ...]], length: float | None
+) -> Motions:
+    return [m for of_role in motions_at(length) for m in of_role]
 
 
 def choose_test_function(motions: Motions, *, imposed: bool = False) -> float:

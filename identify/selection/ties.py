@@ -55,7 +55,20 @@ def _compared_again(step: Step, found: Found) -> Found:
     if leader is own:
         return _with_step(found, step, replace(step, tied=others), final)
     leader = replace(leader, judged=fitted_anew(leader.judged))
-    return _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
+    led = _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
+    return _less_changes_of(step.change.name, led)
+
+
+def _less_changes_of(name: str, found: Found) -> Found:
+    """What was found without other changes of a law that has gone: they were no other law's."""
+    gone = [s for s in found.steps if s.change.name == name]
+    axis = found.final.fit.axis
+    for step in reversed(gone):
+        axis = step.change.undone(axis, found.base.fit.axis) or axis
+    if axis is found.final.fit.axis:
+        return found
+    kept = tuple(s for s in found.steps if s not in gone)
+    return replace(found, steps=kept, final=refitted_on(axis, found.final))
 
 
 def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:
