@@ -2,7 +2,8 @@
 
 The drives of ``drives``, each diagnosed twice with one model: with the one log to fit and the other
 to choose, and the other way round. Two answers are the same where each finding of the one is named,
-or told to be level, by one of the other.
+or told to be level, by one of the other. A finding that only one has may be told to depend on which
+log chooses: by the answer that has it, or by both.
 """
 
 from __future__ import annotations
@@ -37,6 +38,13 @@ def same(one: Sequence[frozenset[str]], other: Sequence[frozenset[str]]) -> bool
     )
 
 
+def alone(here: AxisDiagnosis, there: AxisDiagnosis) -> set[str]:
+    """Effects that one answer names and the other does not."""
+    other = families(there)
+    named = zip(here.findings, families(here), strict=True)
+    return {f.effect for f, family in named if not any(family & b for b in other)}
+
+
 def row(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
     """One drive, its two logs in both orders."""
     drive, (change, _) = DRIVES[name], HIDDEN[hidden]
@@ -47,10 +55,15 @@ def row(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
         diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"]
         for pair in ((one, other), (other, one))
     ]
+    own = [{law.effect for law in answer.by_roles} for answer in found]
+    lone = [alone(*found), alone(*found[::-1])]
     return {
         "case": f"{name} at {recorder.rate} Hz, {hidden}",
         "same": same(*map(families, found)),
+        "told": all(effects <= says for effects, says in zip(lone, own, strict=True)),
+        "told by both": all(effects <= says for effects in lone for says in own),
         "answers": [[sorted(family) for family in families(answer)] for answer in found],
+        "by roles": [sorted(says) for says in own],
     }
 
 
@@ -61,8 +74,8 @@ def rows(seed: int, out: Path | None = None) -> list[Row]:
         assert isinstance(job, partial)
         found.append(row(*job.args))
         own = found[-1]
-        mark = "same" if own["same"] else "OTHER"
-        print(f"{mark}: {own['case']}: {own['answers']}", flush=True)
+        mark = "same" if own["same"] else "told" if own["told"] else "OTHER"
+        print(f"{mark}: {own['case']}: {own['answers']}, {own['by roles']}", flush=True)
         if out:
             with out.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(own) + "\n")
@@ -77,9 +90,15 @@ def measure() -> list[Figure]:
 def figures(found: Sequence[Row]) -> list[Figure]:
     """How often the answer is the same."""
     alike = sum(r["same"] for r in found)
+    told = sum(r["same"] or r["told"] for r in found)
+    both = sum(r["same"] or r["told by both"] for r in found)
     return [
+        Figure("the answer is the same, or says that it depends on it", told / len(found), "1",
+               Target(low=0.95), f"{told} of {len(found)}"),
+        Figure("the same, or both answers say so", both / len(found), "1",
+               note=f"{both} of {len(found)}"),
         Figure("the answer is the same whichever log chooses", alike / len(found), "1",
-               Target(low=0.95), f"{alike} of {len(found)}"),
+               note=f"{alike} of {len(found)}"),
     ]  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from twin.model.units import AxisUnits
 
 Array = NDArray[np.float64]
 
-ENOUGH = 60.0  # s of motion in all logs, in which a search is made before all of it is fitted
+ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
 
 
 class Role(Enum):
@@ -111,6 +111,17 @@ class Dataset:
         moved = self.with_logs(log.at_length(length) for log in self.logs)
         return replace(moved, looks=self.looks + 1, asked=length)
 
+    @property
+    def exchanged(self) -> Dataset | None:
+        """The same with training and selection logs exchanged; None without selection logs."""
+        if not self.selection:
+            return None
+        fit, held = (
+            tuple(replace(log, reach=EVERYWHERE) for log in logs)
+            for logs in (self.selection, self.training)
+        )
+        return replace(self, training=fit, selection=held)
+
     def kept_in(self, axis: AxisModel) -> AxisModel:
         """An axis that was found on these logs, with what others need to tell the same errors."""
         return replace(axis, test_function=self.length, channel_delay=self.channel_delay)
@@ -148,13 +159,12 @@ class Dataset:
         """
         return self._shortened(ENOUGH)
 
-    @property
-    def is_long(self) -> bool:
-        """Whether the logs that decide are so long that their beginnings are searched."""
-        return _beyond_a_block((*self.training, *self.selection)) > ENOUGH
-
     def _shortened(self, seconds: float) -> Dataset:
-        if all(_beyond_a_block(logs) <= seconds for logs in (self.training, self.selection)):
+        # A beginning is whole blocks, and may be longer by half a one.
+        lengths = (
+            (_length(w) - w.motion.period for w in logs) for logs in (self.training, self.selection)
+        )
+        if all(sum(own) <= seconds for own in lengths):
             return self
 
         def cut(logs: tuple[PreparedLog, ...]) -> tuple[PreparedLog, ...]:
@@ -198,11 +208,6 @@ class Dataset:
     def length(self) -> float:
         """The length, s, that makes the same test functions of the same logs."""
         return self.asked or self.test_function_length
-
-
-def _beyond_a_block(logs: Iterable[PreparedLog]) -> float:
-    """s of motion; a beginning is whole blocks, and may be longer by half a one."""
-    return sum(_length(log) - log.motion.period for log in logs)
 
 
 def _length(log: PreparedLog) -> float:

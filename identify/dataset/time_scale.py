@@ -62,41 +62,33 @@ class AtLength:
 def choose_length(
     motions_at: Callable[[float | None], tuple[Motions, ...]], *, imposed: bool = False
 ) -> float:
-    """Length of the test functions, s, for all logs that decide, whatever their roles.
+    """Length of the test functions, s, for the logs to fit and those that choose.
 
-    motions_at: these by role for test functions of a length, whose blocks are short enough for it;
-    for None as long as their noise asks for. imposed: whether there is no mass.
+    motions_at: these for test functions of a length, whose blocks are short enough for it; for
+    None as long as their noise asks for. imposed: whether there is no mass.
     """
-    motions = _each(motions_at, None)
-    chosen = choose_test_function(motions, imposed=imposed)
+    motions, others = motions_at(None)
+    chosen = choose_test_function(motions, others, imposed=imposed)
     shorter = [length for length in TEST_FUNCTIONS if length < chosen]
     if imposed or not shorter:
         return chosen
-    quiet = [AtLength.of(chosen, [m]) for m in motions]
+    quiet = AtLength.of(chosen, motions)
     for length in shorter:
-        finer = _each(motions_at, length)
+        finer = motions_at(length)[0]
         if length < LEAST_BLOCKS * max(m.period for m in finer):
             continue
-        # What one log shows is there, though another one excites it little.
-        pairs = zip(finer, quiet, strict=True)
-        if any(AtLength.of(length, [m]).shows_more_than(own) for m, own in pairs):
+        if AtLength.of(length, finer).shows_more_than(quiet):
             return length
     return chosen
 
 
-def _each(
-    motions_at: Callable[[float | None], tuple[Motions, ...]], length: float | None
-) -> Motions:
-    return [m for of_role in motions_at(length) for m in of_role]
-
-
-def choose_test_function(motions: Motions, *, imposed: bool = False) -> float:
+def choose_test_function(motions: Motions, others: Motions = (), *, imposed: bool = False) -> float:
     """The shortest test function (s) whose noise floor is small against the force to be explained.
 
-    imposed: whether there is no mass.
+    others: motions whose blocks it must also be long enough for. imposed: whether there is no mass.
     """
     mass = 0.0 if imposed else inertia(motions)
-    longest_block = max(m.period for m in motions)
+    longest_block = max(m.period for m in (*motions, *others))
     for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:
             continue

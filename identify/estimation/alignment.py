@@ -190,18 +190,6 @@ def time_origins(dataset: Dataset) -> Array:
     return np.array([log.motion.time_origin for log in dataset.logs])
 
 
-def aligned_as(one: Dataset, dataset: Dataset) -> Dataset:
-    """A dataset with the length, the channel delay and the clocks that were found of its logs."""
-    if one.length != dataset.length:
-        dataset = dataset.at_length(one.length)
-    clocks = dict(zip((log.motion.name for log in one.logs), time_origins(one), strict=True))
-    begun = np.array([clocks[log.motion.name] for log in dataset.logs])
-    dataset = begun_at(realigned(dataset, one.channel_delay), begun)
-    if one.force_noise != dataset.force_noise:
-        dataset = dataset.with_force_noise(one.force_noise)
-    return replace(dataset, looks=one.looks)
-
-
 def begun_at(dataset: Dataset, begun: Array) -> Dataset:
     """The dataset with its logs begun at these times (n,) s, in the order of ``time_origins``."""
     pairs = zip(dataset.logs, begun, strict=True)

@@ -15,7 +15,6 @@ from twin.signals import Array
 BLOCKS = 24  # of time, for a standard error: many for Student's t, each longer than the memory
 SURE = 3.0  # standard errors from which a value is the data's: of noise one in 700 is as far off
 BETTER = 0.99  # of an error, from which another one is hardly better
-OWN_LOG = 0.1  # weight of the other blocks of the same log, where several logs tell of a block
 
 
 def rms(values: Array) -> float:
@@ -113,27 +112,17 @@ def noise_gain(residual: Array, before: float, after: float) -> float:
     return float(power / before**2 - power / after**2 - 2.0 * np.log(after / before))
 
 
-def left_out(
-    residual: Array, columns: Array, penalty: Array | float = 0.0, rows: Sequence[int] = ()
-) -> Array:
-    """Residual (n,) by cross-validation: each block predicted by a fit to the others.
+def left_out(residual: Array, columns: Array, penalty: Array | float = 0.0) -> Array:
+    """Residual (n,) by cross-validation: each block predicted by a fit to the other blocks.
 
-    Of several logs those of its own log count a tenth: they tell what no other log does, and else
-    the others decide. Exact for a model linear in its parameters, with columns (n, k). penalty
-    (k, k): of what is smoothed; a weak one on all keeps the inverse finite. rows: how many each log
-    has; none where all are of one.
+    Exact for a model linear in its parameters, with columns (n, k): (I - H_bb)^-1 r_b with the hat
+    matrix H. penalty (k, k): of what is smoothed; a weak one on all keeps the inverse finite.
     """
     spans = blocks_of(len(residual))
     grams, pulls = by_blocks(columns, columns, spans), by_blocks(columns, residual, spans)
-    middles = [(span.start + span.stop) // 2 for span in spans]
-    log = np.searchsorted(np.cumsum(rows), middles, side="right")
-    own = (log[:, None] == log) if len(rows) > 1 else np.zeros((len(spans), len(spans)))
-    less = (1.0 - OWN_LOG) * own  # of the weight of each block, what is taken of it
-    np.fill_diagonal(less, 1.0)
     whole = grams.sum(axis=0)
     weak = RIDGE**2 * np.diag(np.diag(whole))
-    known = whole - np.tensordot(less, grams, axes=1) + weak + penalty
-    moves = solve(known, (less @ pulls)[..., None])[..., 0]
+    moves = solve(whole - grams + weak + penalty, pulls[..., None])[..., 0]
     steps = (columns[span] @ move for span, move in zip(spans, moves, strict=True))
     return residual + np.concatenate([*steps, np.zeros(0)])
 

@@ -16,7 +16,7 @@ from identify.output.numbers import (
     number,
     quantity,
 )
-from identify.output.words.diagnosis import judged_by, said_of, why_not
+from identify.output.words.diagnosis import said_of, tested_on, why_not
 from identify.output.words.fit import (
     LOOPS,
     agreement_in_words,
@@ -196,7 +196,7 @@ def _candidates(found: AxisDiagnosis) -> Iterator[str]:
     """The best candidates, a line each."""
     shown = found.ranking[:SHOWN]
     if any(c.score for c in shown):
-        yield f"  candidates with their evidence (difference of BIC) and the {judged_by(found)}"
+        yield f"  candidates with their evidence (difference of BIC) and the {tested_on(found)}"
     yield from (_candidate(c, found) for c in shown)
 
 

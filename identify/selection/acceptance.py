@@ -18,19 +18,18 @@ thresholds (``RULE``):
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.coordinates import Covered
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
-from identify.dataset.prepared_log import EVERYWHERE, PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
-from identify.estimation.fit import Fit, fit_axis, has_nonparametric, smoothing
+from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
 from identify.estimation.least_squares import solve
 from identify.rules import RULE
@@ -65,14 +64,13 @@ class Score:
     """A change against the model without it, on the training logs and on logs not fitted to.
 
     control: the part that all but one in twenty of its controls stay below. among: of how many
-    changes it was chosen. apart: whether the two groups are of other logs.
+    changes it was chosen.
     """
 
     training: Taken
     other: Taken
     control: float = 0.0
     among: int = 1
-    apart: bool = True
 
     @property
     def t(self) -> float:
@@ -81,8 +79,8 @@ class Score:
 
     @property
     def together(self) -> float:
-        """The t of both groups of logs together (S. A. Stouffer); of the same logs the smaller."""
-        return float((self.training.t + self.other.t) / np.sqrt(2.0)) if self.apart else self.t
+        """The t of both groups of logs together (S. A. Stouffer)."""
+        return float((self.training.t + self.other.t) / np.sqrt(2.0))
 
     @property
     def part(self) -> float:
@@ -113,7 +111,7 @@ class Score:
 class Judged:
     """A fit with what it leaves of logs that it was not fitted to: the selection logs.
 
-    Where there are none, of each block of the training logs by a fit to the others (``left_out``).
+    Where there are none, of each block of the training logs by a fit to the others.
     """
 
     fit: Fit
@@ -134,8 +132,7 @@ class Judged:
             return left_on(fit, logs)
         columns, out = fit.jacobian, np.full(len(fit.kept), np.nan)
         rows = self._smoothing
-        each = [int(kept.sum()) for kept in split_by_log(fit.kept, fit.logs)]
-        out[fit.kept] = left_out(fit.residual, columns, rows.T @ rows, each)
+        out[fit.kept] = left_out(fit.residual, columns, rows.T @ rows)
         return out
 
     def tell(self) -> None:
@@ -188,24 +185,6 @@ class Judged:
         return self.fit.at_floor and (self.other_at_floor or not tells)
 
 
-def together(base: Fit, dataset: Dataset) -> Judged:
-    """A fit to all logs that decide, as one set in which each is judged by the others.
-
-    Which of them is given to fit and which to choose is no property of the machine.
-    """
-    if not dataset.selection:
-        return Judged(base, dataset)
-    deciding = sorted(dataset.training + dataset.selection, key=lambda log: log.motion.name)
-    travel = dataset.covered.travel if isinstance(dataset.covered, Covered) else None
-    one = replace(
-        dataset,
-        training=tuple(replace(log, reach=EVERYWHERE) for log in deciding),
-        selection=(),
-        covered=Covered(tuple(log.motion for log in deciding), travel),
-    )
-    return Judged(replace(fit_axis(base.axis, one.training), begun=base.begun), one)
-
-
 def left_on(fit: Fit, logs: Sequence[PreparedLog]) -> Array:
     """Residual (n,) N of a fit on other logs; not a number where it tells nothing."""
     kept = moving(logs, sticks(fit.axis))
@@ -223,7 +202,7 @@ def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -
     charge = max(after.parameters - before.parameters, 0.0) / samples
     training = taken(before.training, after.training, before.fit.floor, charge)
     other = taken(before.other, after.other, before.other_floor)
-    return Score(training, other, control, among, apart=bool(after.dataset.selection))
+    return Score(training, other, control, among)
 
 
 def prefers(one: Judged, other: Judged) -> bool:

@@ -9,17 +9,16 @@ from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.time_scale import TEST_FUNCTIONS
-from identify.estimation.fit import Errors, Fit, finished, fit_axis
+from identify.estimation.fit import Errors, Fit, finished
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.rules import RULE
-from identify.selection.acceptance import together
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, control
 from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.lengths import at_another_length
 from identify.selection.odd_logs import without_odd_log
-from identify.selection.roles import in_roles
+from identify.selection.roles import RoleDependent, role_dependent
 from identify.selection.search import Found, Step
 from twin.effects import Catalogue
 from twin.parallel import Progress, silent
@@ -44,7 +43,8 @@ class AxisDiagnosis:
     the final fit is without. doubted: by name of each law that was taken out at the end, why, in
     words. unexplained: what the residual depends on, where it is
     not noise. small: effects that the data show and that take too little to matter. repeat: a force
-    that repeats along the track in each log, but at other places in each.
+    that repeats along the track in each log, but at other places in each. by_roles: laws that are
+    proved or not by which log chooses.
     """
 
     dataset: Dataset
@@ -59,6 +59,7 @@ class AxisDiagnosis:
     unexplained: Dependence | None = None
     small: tuple[str, ...] = ()
     repeat: Repeat | None = None
+    by_roles: tuple[RoleDependent, ...] = ()
 
     def __repr__(self) -> str:
         answer = f"{self.verdict.name.lower()} {list(self.answers)}"
@@ -100,6 +101,11 @@ class AxisDiagnosis:
         return self.tested.share_of(self.tested.before, self.base.floor)
 
     @property
+    def in_part(self) -> bool:
+        """Whether the logs were so long that their beginnings were searched."""
+        return any(len(c.fit.kept) < len(self.base.kept) for c in self.ranking)
+
+    @property
     def best(self) -> Candidate | None:
         """The candidate that is named first, where one is."""
         added = (s.tried.candidate for s in self.steps if isinstance(s.change, Added))
@@ -130,11 +136,7 @@ def diagnose_axis(
         ended = concluded(fit, some, catalogue, progress)
         return at_another_length(ended, lengths, catalogue, progress)
 
-    asked, odd = without_odd_log(together(base, dataset), conclude)
-    given = dataset if odd is None else dataset.without(odd.log)
-    if [*given.training] != [*dataset.training]:
-        base = replace(fit_axis(base.axis, given.training), begun=base.begun)
-    ended = in_roles(asked, base, given)
+    ended, odd = without_odd_log(base, dataset, conclude)
     found, findings = ended.found, ended.findings
     final = found.final
     # Either may be known by too low a floor; what the logs differ by is told.
@@ -152,6 +154,7 @@ def diagnose_axis(
         unexplained=None if quiet else find_dependence(final.fit, found.dataset),
         small=_small(found),
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
+        by_roles=role_dependent(found, findings),
     )
 
 

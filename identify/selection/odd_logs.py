@@ -16,20 +16,18 @@ from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
 from identify.estimation.disagreement import odd_in
 from identify.estimation.fit import Fit, fit_axis
-from identify.selection.acceptance import Judged
 from identify.selection.doubts import Conclusion
 
 MOST_TURNS = 3  # of leaving out and asking again
 
 
 def without_odd_log(
-    given: Judged, conclude: Callable[[Fit, Dataset], Conclusion]
+    base: Fit, dataset: Dataset, conclude: Callable[[Fit, Dataset], Conclusion]
 ) -> tuple[Conclusion, Disagreement | None]:
     """What the logs come to but one that disagrees with the others, and that one.
 
     conclude: what a fit of some logs comes to.
     """
-    base, dataset = given.fit, given.dataset
     odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
         ended = conclude(*_others(base, dataset, odd))

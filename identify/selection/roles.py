@@ -1,49 +1,83 @@
-"""One answer whatever the roles of the logs: all that decide are one set, and what is told of it.
+"""What only the choice of the logs' roles decides.
 
-Which of two like logs is given to fit and which to choose is a user's choice, and no property of
-the machine. So what a model lacks is asked of all of them together: each law is fitted to all, and
-judged on every block by a fit to the other logs (``evidence.left_out``). The values that are told,
-the errors and the final model are those of the roles, as any other command tells them: fitted to
-the training logs alone.
+A law is fitted to the training logs and judged by the selection logs. Which of two like logs does
+which is the user's choice, and no property of the machine. So it is asked once more with the roles
+exchanged: of each law that was found whether it is still proved, and of those that only the
+selection logs refused whether it is then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.alignment import aligned_as
-from identify.estimation.fit import Fit, fit_axis
-from identify.selection.acceptance import Judged
-from identify.selection.doubts import Conclusion
-from identify.selection.findings import Finding, findings_of
+from identify.rules import RULE
+from identify.selection.acceptance import Judged, Score, least_t, score
+from identify.selection.changes import control
+from identify.selection.findings import Finding
 from identify.selection.search import Found
+from identify.selection.trying import refitted_on
 
 
-def in_roles(ended: Conclusion, base: Fit, dataset: Dataset) -> Conclusion:
-    """What all logs that decide come to, with the values and errors that their roles tell.
+@dataclass(frozen=True)
+class RoleDependent:
+    """A law that is proved by the one log and not by the other.
 
-    base: the fit of the given model to the training logs of the dataset.
+    effect: its name. named: whether it is proved as the roles are, and not with them exchanged; or
+    the other way round. part, t: of the score that refuses it.
     """
-    if not dataset.selection:
-        return ended
-    found = ended.found
-    there = aligned_as(found.dataset, dataset)
-    same = all(a is b for a, b in zip(there.training, dataset.training, strict=True))
-    first = base if same else replace(fit_axis(base.axis, there.training), begun=base.begun)
-    final = first
-    if found.steps:
-        final = replace(fit_axis(found.final.fit.axis, there.training), begun=base.begun)
-    told = replace(found, dataset=there, base=Judged(first, there), final=Judged(final, there))
-    return replace(ended, found=told, findings=_proved_as(ended.findings, told))
+
+    effect: str
+    named: bool
+    part: float
+    t: float
 
 
-def _proved_as(findings: Sequence[Finding], found: Found) -> tuple[Finding, ...]:
-    """The findings as the roles tell them; what proves them is the test on all logs."""
-    proofs = {f.effect: f for f in findings}
-    return tuple(
-        replace(f, score=p.score, doubt=p.doubt, tied=p.tied, kind=p.kind)
-        for f in findings_of(found)
-        if (p := proofs.get(f.effect))
-    )
+def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDependent, ...]:
+    """The laws on which the answer depends by the roles of the logs; none without selection logs.
+
+    Of long logs their beginnings tell it.
+    """
+    dataset = found.dataset.part.exchanged
+    if dataset is None or (found.final.at_floor and not findings):
+        return ()
+    final = refitted_on(found.final.fit.axis, Judged(found.final.fit, dataset))
+    return (*_lost(found, findings, final), *_gained(found, final, dataset))
+
+
+def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[RoleDependent]:
+    """Of the findings those that are not proved with the roles exchanged."""
+    base = found.base.fit.axis
+    for finding in findings:
+        steps = [s for s in found.steps if s.change.name == finding.effect]
+        axis = final.fit.axis
+        for step in reversed(steps):
+            axis = step.change.undone(axis, base) or axis
+        there = score(refitted_on(axis, final), final)
+        if any(s.held or s.tried.candidate.is_noise for s in steps) or _proved(there):
+            continue
+        yield RoleDependent(finding.effect, True, there.part, there.t)
+
+
+def _gained(found: Found, final: Judged, dataset: Dataset) -> Iterator[RoleDependent]:
+    """Of the laws that only the selection logs refused those that are proved then."""
+    for tried in found.last:
+        own = tried.candidate.score
+        if own is None or tried.candidate.doubt or not _by_selection_alone(own):
+            continue
+        after = refitted_on(tried.judged.fit.axis, Judged(tried.judged.fit, dataset))
+        there = score(final, after, among=own.among)
+        if there.accepted and there.part > control(tried.change, final, after):
+            yield RoleDependent(tried.change.name, False, own.part, own.t)
+
+
+def _by_selection_alone(own: Score) -> bool:
+    """Whether the training logs would have had it."""
+    group = own.training
+    return not own.accepted and group.t >= least_t(1) and group.part >= RULE.least_part
+
+
+def _proved(there: Score) -> bool:
+    """Whether a law is proved beside all others, where it alone is asked."""
+    return replace(there, among=1).accepted

@@ -11,13 +11,13 @@ from functools import partial
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import knows_rounding
-from identify.estimation.alignment import aligned_as, moved_by
+from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves, turned
 from identify.estimation.free_curves import shapes_of
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, together
+from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate, candidate_of, noise_candidate
 from identify.selection.changes import (
     Added,
@@ -257,27 +257,15 @@ def try_effect(base: Fit, dataset: Dataset, effect: Effect) -> Candidate:
 
 
 def effect_tried(base: Fit, dataset: Dataset, effect: Effect) -> Tried:
-    """The same with the dataset, whose channel delay may be another beside the effect.
-
-    All logs that decide prove it; its values are those of the training logs.
-    """
-    before, change = together(base, dataset), Added(effect)
+    """The same with the dataset, whose channel delay may be another beside the effect."""
+    before, change = Judged(base, dataset), Added(effect)
     if effect.is_noise:
-        return as_noise(Judged(base, dataset), effect)
+        return as_noise(before, effect)
     screening = change.screen(before, ControlTest.beside(before))
     fit = change.refit(before, screening)
     if not fit.at_floor:
-        axis = from_all_starts(before, screening, fit).axis
-        fit = fit_multistart(axis, before.dataset, base.begun)
-    tried = judged_change(before, screening, fit)
-    if before.dataset is dataset:
-        return tried
-    there = aligned_as(tried.judged.dataset, dataset)
-    given = Judged(replace(fit_axis(base.axis, there.training), begun=base.begun), there)
-    after, proof = refitted_on(tried.judged.fit.axis, given), tried.candidate
-    own = candidate_of(given, after, effect, parameters(change))
-    own = replace(own, score=proof.score, doubt=proof.doubt)
-    return replace(tried, judged=after, candidate=own)
+        fit = fit_multistart(from_all_starts(before, screening, fit).axis, dataset, base.begun)
+    return judged_change(before, screening, fit)
 
 
 def reshape(

@@ -78,7 +78,7 @@ def test_planted_friction_is_found(folder):
         assert values["sigma2"] == pytest.approx(viscous, rel=0.02)
         # the offset of each joint, of which this arm has none
         assert abs(found.fits[joint].axis["constant_force"].values["F0"]) < 0.02 * coulomb
-        assert found.fits[joint].error < 0.01 * coulomb
+        assert found.fits[joint].ratio < 1.5
         assert found.datasets[joint].channel_delay == 0.0
 
 

@@ -342,6 +342,16 @@ def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None
 # --- diagnoses -------------------------------------------------------------------------------
 
 
+class RoleDependentEntry(Entry):
+    """A law that is proved or not by which log chooses."""
+
+    effect: str
+    named: bool
+    """Whether it is proved as the roles are; else it is with them exchanged."""
+    part: Number
+    t: Number
+
+
 class DiagnosisEntry(Entry):
     """The diagnosis of an axis."""
 
@@ -357,6 +367,7 @@ class DiagnosisEntry(Entry):
     """Part of the squared error above the noise floor that all findings together remove."""
     needed_together: list[str]
     also_seen: list[str] = read("small")
+    depends_on_roles: list[RoleDependentEntry] = read("by_roles")
     unexplained: DependenceEntry | None
     remainder: RemainderEntry | None
     repeats_not_general: RepeatEntry | None = read("repeat")

@@ -8,7 +8,7 @@ from identify.output.machine import minor
 from identify.output.numbers import DisplayUnit, arrow, capitalised, number, quantity, spaced
 from identify.output.report.page import AnswerBlock, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import CROSS_VALIDATED, Said
+from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.next_step import Source, body_in_words, next_step_in_words
 from identify.output.words.recording import read_otherwise_in_words
@@ -79,7 +79,7 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
     if found.dataset.selection:
         errors["selection logs"] = (summary.chosen.before, summary.chosen.after)
     elif found.best is not None and len(found.named) == 1:
-        errors[CROSS_VALIDATED.split()[0]] = (found.best.gain.before, found.best.gain.after)
+        errors[tested_on(found).split()[0]] = (found.best.gain.before, found.best.gain.after)
     if summary.tested.on is Role.TEST:
         errors["test logs"] = (summary.tested.before, summary.tested.after)
     remark = f"with {view.label}, RMS" if view.label else "RMS"

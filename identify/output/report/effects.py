@@ -32,7 +32,7 @@ from identify.output.report.page import (
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import judged_by, why_not
+from identify.output.words.diagnosis import tested_on, why_not
 from identify.output.words.findings import shape_in_words
 from identify.output.words.fit import (
     common_reason,
@@ -158,7 +158,7 @@ def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> TableBlock:
     }
     caption = (
         f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
-        f"BIC. Error: RMS force, {judged_by(found)}. Part removed: of the squared error above the "
+        f"BIC. Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the "
         "noise floor, on the training logs or on data left out of the fit, whichever is less."
     )
 

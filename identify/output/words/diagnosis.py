@@ -12,6 +12,7 @@ from identify.output.words.findings import (
     all_in_words,
     finding_in_words,
     left_in_words,
+    role_in_words,
     shape_in_words,
 )
 from identify.output.words.fit import (
@@ -86,6 +87,7 @@ def said_of(result: Diagnosis, axis: str) -> Said:
     beside = all_in_words(found)
     if found.small:
         beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
+    beside += [role_in_words(law) for law in found.by_roles]
     corrected, verdict = "", words(verdict_in_words(found))
     if result.body and axis in result.body.axes:
         corrected = f"with body {result.body.body} as it was found, "
@@ -109,13 +111,10 @@ def said_of(result: Diagnosis, axis: str) -> Said:
 # --- the answer -------------------------------------------------------------------------------
 
 
-CROSS_VALIDATED = "cross-validated error"
-
-
-def judged_by(found: AxisDiagnosis) -> str:
-    """What the error is called by which a candidate was judged, and of what it is."""
-    long = found.dataset.is_long
-    return f"{CROSS_VALIDATED} of the beginnings of the logs" if long else CROSS_VALIDATED
+def tested_on(found: AxisDiagnosis) -> str:
+    """What the error is called by which a candidate was judged."""
+    kind = "selection error" if found.dataset.selection else "cross-validated error"
+    return f"{kind} of the beginnings, which were searched" if found.in_part else kind
 
 
 # --- the way to the answer --------------------------------------------------------------------
@@ -148,7 +147,7 @@ def step_lines(found: AxisDiagnosis) -> list[str]:
         why = not_named_in_words(found, i)
         before, after = change(gain.before, gain.after, unit)
         lines.append(
-            f"step {i + 1}: with {what} the {CROSS_VALIDATED} falls from {before} to "
+            f"step {i + 1}: with {what} the {tested_on(found)} falls from {before} to "
             f"{after}{dropped}{f'; not named: {why}' if why else ''}"
         )
     return lines

@@ -10,6 +10,7 @@ from identify.output.numbers import DisplayUnit, each_with_unit, number, percent
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, Finding, FindingKind
+from identify.selection.roles import RoleDependent
 from twin.model.units import units_of
 
 
@@ -139,3 +140,11 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
     elif found.dataset.force_noise:
         what = "nothing that was measured predicts it, and its origin is not known"
     return [f"{said}: {what}."]
+
+
+def role_in_words(law: RoleDependent) -> str:
+    """That a law is proved or not by which log chooses."""
+    other = f"it takes {percent(max(law.part, 0.0))} of what is left, t = {law.t:.1f}"
+    proved = "with the training and the selection logs exchanged it is"
+    says = f"{proved} not proved: {other}" if law.named else f"as they are not ({other}), {proved}"
+    return f"whether {law.effect} is proved depends on which log chooses: {says}"

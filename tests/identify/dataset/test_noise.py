@@ -337,7 +337,7 @@ def test_the_shortest_window_that_is_quiet_is_chosen():
         quiet = quiet or motion
     slow = replace(motion, period=6.3e-3)
     assert choose_test_function([quiet]) == TEST_FUNCTIONS[0]
-    assert choose_test_function([quiet, slow]) == TEST_FUNCTIONS[2]
+    assert choose_test_function([quiet], [slow]) == TEST_FUNCTIONS[2]
 
 
 def test_an_axis_moves_where_its_noise_does_not_cover_its_travel():

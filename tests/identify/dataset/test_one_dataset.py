@@ -255,8 +255,8 @@ def test_logs_too_short_for_a_motion_or_a_test_function_are_told_by_their_length
 
 
 def test_the_beginnings_of_long_logs_are_their_own_beginnings():
-    """Also where 60 s are no whole number of samples, and a beginning is a little longer."""
-    t = np.arange(45_000) / 610.36
+    """Also where 30 s are no whole number of samples, and a beginning is a little longer."""
+    t = np.arange(27_000) / 610.36
     log = log_of(610.36, np.sin(3.0 * t) + 0.3 * np.sin(11.0 * t), -9.0 * np.sin(3.0 * t))
     whole = datasets(PLAIN, {"l": log}, {})["x"]
     assert len(whole.part.training[0]) < len(whole.training[0])

@@ -19,7 +19,6 @@ from built_fits import axis_of, built, built_fit, fitted
 from report_cases import Case, Outline
 
 from identify import workflow
-from identify.dataset.dataset import Role
 from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.estimation.fit import Outcome, finished
@@ -276,12 +275,10 @@ def test_a_failure_leaves_the_old_report(
 
 
 def test_the_selection_error_is_one_number(case: Case) -> None:
-    (finding,), (step,) = case.x.findings, case.addition.model.history
+    (finding,), (cogging, *_) = case.x.findings, case.x.ranking
     assert case.x.dataset.channel_delay > 0.0
     assert case.x.chosen.before == pytest.approx(finding.tested.before)
-    before, after = errors_of_step(step)[Role.SELECTION]
-    assert before == pytest.approx(case.x.chosen.before, rel=1e-2)
-    assert after == pytest.approx(case.x.chosen.after, rel=1e-2)
+    assert case.x.chosen.before == pytest.approx(cogging.gain.before, rel=1e-3)
 
 
 def test_no_error_of_the_growth_is_below_the_floor_of_its_logs(case: Case) -> None:
