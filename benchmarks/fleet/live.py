@@ -1,4 +1,4 @@
-"""What `twin watch` takes: of a core at 10 kHz and two axes, and of memory over a day."""
+"""What `twin watch` takes of a core and of memory over a day, and how soon it tells wear."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from benchmarks.figures import Figure, Target
 from identify.fleet.floor import STAGE
@@ -26,13 +28,15 @@ MB = 1e6
 HOUR, DAY = 3600.0, 86_400.0  # s
 STRETCH = 60.0  # s that are simulated, and follow each other with a gap of one second
 SLOWER = 4  # 250 Hz, so that a day passes in minutes
+PARTS, PART, GROWN = 30, 20.0, 0.1  # stretches, s of each, growth of friction
 SIGNALS = ("position", "velocity", "current", "force")
 
 
 def figures() -> Iterator[Figure]:
-    """Both."""
+    """All of them."""
     yield _core()
     yield from _day(DAY)
+    yield from _wear()
 
 
 def _core() -> Figure:
@@ -68,6 +72,31 @@ def _day(seconds: float) -> Iterator[Figure]:
     note = f"{seconds / HOUR:.0f} h in {watcher.windows} windows, {spent:.0f} s of a core"
     yield Figure("memory beyond that of the first hour", (used[-1] - used[0]) / MB, "MB",
                  Target(high=10.0), f"{note}; {used[-1] / MB:.0f} MB in all")  # fmt: skip
+
+
+def _wear() -> Iterator[Figure]:
+    """Ten minutes of stretches, in whose second half the Coulomb friction grows by a tenth."""
+    model, watcher = load_model(STAGE), Watcher(load_model(STAGE))
+    axis, friction = model.axes["x"], "coulomb_viscous"
+    fitted, early, told, missed = axis[friction].values["Fc"], 0, np.inf, list[float]()
+    for i in range(PARTS):
+        share = 1.0 + GROWN * max(i - PARTS // 2 + 1, 0) / (PARTS // 2)
+        own = replace(axis[friction], values={**axis[friction].values, "Fc": share * fitted})
+        worn = model.with_axis("x", axis.without(friction).with_effect(own))
+        log = simulate(worn, "tracking", seed=i, duration=PART, simulator=ReducedSimulator)
+        size = round(log.sample_rate)
+        for j in range(round(PART)):
+            window = watcher.take((PART + 1.0) * i + j, log.part(j * size, (j + 1) * size))
+            early += len(window.alarms) if share == 1.0 else 0
+            told = min([told, *(share for _ in window.alarms if share > 1.0)])
+        if window.axes:
+            (now,) = (p for p in window.axes[0].parameters if p.name == f"{friction}.Fc")
+            missed.append(abs(now.value - share * fitted) / fitted)
+    note = f"{PARTS} stretches of {PART:g} s; Coulomb friction grows by {GROWN:.0%}"
+    yield Figure("alarms before there is wear", early, "1", Target(high=0.0), note)
+    yield Figure("wear at the first alarm", told - 1.0, "1", Target(high=GROWN), note)
+    yield Figure("followed friction off the true one, at most", max(missed), "1",
+                 note="of it; behind what is true by the memory")  # fmt: skip
 
 
 def _windows(log: Log, seconds: float) -> Iterator[tuple[float, Log]]:
