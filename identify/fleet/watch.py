@@ -12,6 +12,7 @@ from time import monotonic, sleep
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.bodies import bodies_along
 from identify.dataset.given_logs import is_driven, telling_in
@@ -136,7 +137,12 @@ class Watcher:
         return PreparedLog.of(motion, LENGTH)
 
     def _told(
-        self, name: str, logs: Sequence[PreparedLog], left: Array, some: Array, share: float
+        self,
+        name: str,
+        logs: Sequence[PreparedLog],
+        left: Array,
+        some: NDArray[np.bool_],
+        share: float,
     ) -> LiveAxis:
         """An axis by its residual (n,) N in these test functions, of which some (n,) count."""
         axis, errors = self.model.axes[name], self.errors.get(name, [])
