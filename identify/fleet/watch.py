@@ -54,6 +54,9 @@ class Source(Protocol):
         """The whole windows of that length (s) that are there by now, with their times."""
         ...
 
+    def close(self) -> None:
+        """Leave it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
