@@ -13,6 +13,7 @@ from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.fit import Fit, error_if_any
+from identify.fleet.engine import engine, outcomes
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
@@ -175,20 +176,33 @@ def _finding_cell(f: Row) -> str:
     )
 
 
-def judged(jobs: Mapping[str, Callable[[], Row]], out: Path | None) -> list[Row]:
-    """The rows of the cases, each told as it is done; those that fail are told and left out.
+def judged(
+    jobs: Mapping[str, Callable[[], Row]], out: Path | None, workers: int | None = None
+) -> list[Row]:
+    """The rows of the cases, in their order; those that fail are told and left out.
 
-    out: file for the rows as JSON, a line each.
+    They run on so many processes, one a core where None, and each is told as it is done. out: file
+    for the rows as JSON, a line each.
     """
-    rows: list[Row] = []
+    rows: dict[str, Row] = {}
     print(HEAD, flush=True)
-    for case, job in jobs.items():
-        try:
-            rows.append(job())
-        except Exception as error:  # the other machines are to be judged all the same
-            print(f"| {case} | FAILED: {type(error).__name__}: {error} |", flush=True)
-            continue
-        print(in_line(rows[-1]), flush=True)
-        if out:
-            out.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
-    return rows
+    with engine(workers=workers) as (executor, count):
+        for case, row in outcomes(executor, count, _row, jobs.items()):
+            if isinstance(row, str):
+                print(f"| {case} | FAILED: {row} |", flush=True)
+                continue
+            rows[case] = row
+            print(in_line(row), flush=True)
+            if out:
+                lines = (json.dumps(rows[c]) + "\n" for c in jobs if c in rows)
+                out.write_text("".join(lines), encoding="utf-8")
+    return [rows[case] for case in jobs if case in rows]
+
+
+def _row(job: tuple[str, Callable[[], Row]]) -> tuple[str, Row | str]:
+    """The row of a case, or why there is none: the other machines are to be judged all the same."""
+    case, make = job
+    try:
+        return case, make()
+    except Exception as error:
+        return case, f"{type(error).__name__}: {error}"

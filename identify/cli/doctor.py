@@ -18,6 +18,7 @@ NEEDED = (
     "python-dateutil",
 )  # fmt: skip
 FOR_FLEET = ("dask", "distributed", "duckdb", "pyarrow")
+FOR_LIVE = ("foxglove-sdk", "websockets")
 FOR_IMPORT = ("h5py", "mcap-protobuf-support", "rosbags", "pyarrow", "npTDMS")
 AGAIN = "pip install --upgrade proton-twin"
 
@@ -86,6 +87,13 @@ def _fleet() -> Line:
     return Line("fleet", found or "none of its packages", remedy, needed=False)
 
 
+def _live() -> Line:
+    found, absent = _versions(FOR_LIVE)
+    how = f"lacks {', '.join(absent)} (`twin watch` of topics): "
+    remedy = how + pip_install("live") if absent else None
+    return Line("live", found or "none of its packages", remedy, needed=False)
+
+
 def _versions(names: tuple[str, ...]) -> tuple[str, list[str]]:
     from twin.logs.writer import software_version
 
@@ -139,5 +147,5 @@ def _threads() -> Line:
 
 
 LOOKS: tuple[Callable[[], Line], ...] = (
-    _twin, _python, _packages, _importers, _fleet, _cache, _mujoco, _display, _threads,
+    _twin, _python, _packages, _importers, _fleet, _live, _cache, _mujoco, _display, _threads,
 )  # fmt: skip

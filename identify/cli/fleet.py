@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
@@ -12,6 +13,9 @@ from identify.cli.command import Commands, Said, progress_on_stderr, tried
 from identify.cli.shared import Effects, app, written
 from twin.errors import InputError
 from twin.telling import heard
+
+if TYPE_CHECKING:
+    from identify.results.fleet import Floor
 
 ABOUT = "Watch many machines: their logs over time, what changed and when."
 fleet = Commands(
@@ -24,35 +28,50 @@ StoreOption = Annotated[Path, Option("--store", metavar="DIR", help="Folder of t
 Workers = Annotated[
     int | None, Option(min=1, help="Processes on this computer; one a core if left out.")
 ]
+Folder = Annotated[Path, Argument(metavar="FOLDER", help="Folder of MCAP logs, and those below.")]
+ModelsOption = Annotated[
+    str,
+    Option(
+        "--model",
+        help="Machine model (.toml) of all machines, or a folder with MACHINE.toml of each and "
+        "default.toml of the others.",
+    ),
+]
+PatternOption = Annotated[
+    str | None,
+    Option(
+        help="Where paths tell machine, axis and start and the logs do not, as "
+        "'{machine}/{started}.mcap'."
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    Option(
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers do it, as tcp://host:8786; this computer if left out.",
+    ),
+]
+Ingested = Annotated[
+    Path | None,
+    Option(
+        "--logs",
+        metavar="FOLDER",
+        help="Folder that was ingested: the nights after an alarm of the force error are "
+        "diagnosed.",
+    ),
+]
+SameModels = Annotated[
+    str | None, Option("--model", help="As for `twin fleet ingest`; with --logs.")
+]
 
 
 @fleet.command()
 def ingest(
-    logs: Annotated[Path, Argument(metavar="FOLDER", help="Folder of MCAP logs, and those below.")],
+    logs: Folder,
     store: StoreOption,
-    model: Annotated[
-        str,
-        Option(
-            "--model",
-            help="Machine model (.toml) of all machines, or a folder with MACHINE.toml of each and "
-            "default.toml of the others.",
-        ),
-    ],
-    pattern: Annotated[
-        str | None,
-        Option(
-            help="Where paths tell machine, axis and start and the logs do not, as "
-            "'{machine}/{started}.mcap'."
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        Option(
-            metavar="ADDRESS",
-            help="Dask scheduler whose workers do it, as tcp://host:8786; this computer if left "
-            "out.",
-        ),
-    ] = None,
+    model: ModelsOption,
+    pattern: PatternOption = None,
+    scheduler: Scheduler = None,
     workers: Workers = None,
     effects: Effects = None,
 ) -> Said:
@@ -106,18 +125,8 @@ def sql(
 def report(
     store: StoreOption,
     html: Annotated[Path | None, written("HTML page.")] = None,
-    logs: Annotated[
-        Path | None,
-        Option(
-            "--logs",
-            metavar="FOLDER",
-            help="Folder that was ingested: the nights after an alarm of the force error are "
-            "diagnosed.",
-        ),
-    ] = None,
-    model: Annotated[
-        str | None, Option("--model", help="As for `twin fleet ingest`; with --logs.")
-    ] = None,
+    logs: Ingested = None,
+    model: SameModels = None,
     effects: Effects = None,
 ) -> Said:
     """Tell which machines changed, when and by how much, on a page ranked by what needs attention.
@@ -127,8 +136,6 @@ def report(
     Example: twin fleet report --store fleet -o fleet.html
     """
     from identify.fleet.engine import needed
-    from identify.fleet.state import floor_of
-    from identify.fleet.store import Store
     from identify.output.answers.fleet import FloorAnswer
     from identify.output.report.fleet import write_fleet
     from identify.output.words.fleet import floor_in_words
@@ -136,20 +143,30 @@ def report(
     needed("duckdb")
     if (logs is None) != (model is None):
         raise InputError("--logs and --model: give both, or neither")
+    floor, silent = _floor(store, logs, model, effects)
+    failed = tried(lambda: write_fleet(html, floor)) if html else ()
+    answer = FloorAnswer.of(floor, alarms=floor.alarms)
+    said = Said(floor_in_words(floor), answer, [*floor.faults, *silent], fine=not floor.alarms)
+    return replace(said, unwritten=failed)
+
+
+def _floor(
+    store: Path, logs: Path | None, model: str | None, effects: Sequence[Path] | None
+) -> tuple[Floor, list[str]]:
+    """The floor of a store, with causes where the logs are given; what was told on the way."""
+    from identify.fleet.cause import with_causes
+    from identify.fleet.models import Models
+    from identify.fleet.state import floor_of
+    from identify.fleet.store import Store
+
     silent: list[str] = []
     with progress_on_stderr() as progress:
         progress("reading the records", 0, 1)
         floor = floor_of(Store.opened(store))
         if logs and model:
-            from identify.fleet.cause import with_causes
-            from identify.fleet.models import Models
-
             with heard() as silent:
                 floor = with_causes(floor, logs, Models.at(model, effects or ()), progress)
-    failed = tried(lambda: write_fleet(html, floor)) if html else ()
-    answer = FloorAnswer.of(floor, alarms=floor.alarms)
-    said = Said(floor_in_words(floor), answer, [*floor.faults, *silent], fine=not floor.alarms)
-    return replace(said, unwritten=failed)
+    return floor, silent
 
 
 @fleet.command()

@@ -66,6 +66,7 @@ def watch(
     own, _ = loaded(model, effects)
     source, run = _source(log), _Run(Watcher(own))
     with ExitStack() as open_now:
+        open_now.callback(source.close)
         show = open_now.enter_context(_shown(log))
         behind = open_now.enter_context(background(own, effects or ()))
         served = None if serve is None else open_now.enter_context(serving(serve))

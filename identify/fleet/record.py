@@ -35,6 +35,8 @@ from twin.telling import heard
 SIGNALS = ("position", "velocity", "setpoint_position", "current", "force", "pressure",
            "pressure_2", "temperature")  # fmt: skip
 
+WRITING = "is still being written; it is left for the next time"
+
 
 class State(Enum):
     """What became of a log."""
@@ -64,7 +66,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of the log of this name; what: of a faulty one, in words."""
+    """What became of the log of this name; what: of one without a fit, in words."""
 
     name: str
     state: State
@@ -110,7 +112,7 @@ def record(task: Task) -> Outcome:
     try:
         before = task.path.stat()
         if _is_unfinished(task.path):
-            return Outcome(task.name, State.UNFINISHED)
+            return Outcome(task.name, State.UNFINISHED, WRITING)
         about, key, found = _known(task)
         if task.store.has(key):
             return Outcome(task.name, State.KNOWN)
@@ -119,7 +121,7 @@ def record(task: Task) -> Outcome:
     except OSError as error:
         return Outcome(task.name, State.UNFINISHED, error.strerror or str(error))
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns):
-        return Outcome(task.name, State.UNFINISHED)
+        return Outcome(task.name, State.UNFINISHED, WRITING)
     task.store.write(key, [{**about, **row} for row in rows])
     return Outcome(task.name, State.FAULTY if what else State.FITTED, what)
 

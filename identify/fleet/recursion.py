@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import effective_samples
@@ -57,7 +58,9 @@ class Recursion:
         """Of each parameter one standard deviation of its prior (p,)."""
         return PRIOR * np.abs(read(self.axis, self.where))
 
-    def take(self, logs: Sequence[PreparedLog], left: Array, some: Array, way: float) -> None:
+    def take(
+        self, logs: Sequence[PreparedLog], left: Array, some: NDArray[np.bool_], way: float
+    ) -> None:
         """Add a window.
 
         left (n,): residual of the fitted model, N, in these test functions; some (n,): which of
@@ -76,7 +79,7 @@ class Recursion:
         kept = np.exp(-0.5 * way / (MEMORY * self._usual(way)))
         old = np.column_stack([self.root, self.aim]) * kept
         new = np.column_stack([columns, -seen]) * weight
-        whole = np.linalg.qr(np.vstack([old, new]), mode="r")
+        whole = _root(np.vstack([old, new]))
         size = len(self.where)
         self.root, self.aim = whole[:size, :size], whole[:size, size]
 
@@ -93,7 +96,7 @@ class Recursion:
         if not size:
             return ()
         both = np.vstack([np.column_stack([self.root, self.aim]), np.eye(size, size + 1)])
-        whole = np.linalg.qr(both, mode="r")
+        whole = _root(both)
         root = np.linalg.inv(whole[:size, :size])
         moved, deviations = root @ whole[:size, size], np.linalg.norm(root, axis=1)
         fitted = read(self.axis, self.where)
@@ -107,3 +110,8 @@ class Recursion:
 
     def _units(self) -> list[str]:
         return [self.axis.units(c.parameter.unit) for c in self.where]
+
+
+def _root(rows: Array) -> Array:
+    """The triangular root of the information of rows (m, n), of which there are at least n."""
+    return np.asarray(np.linalg.qr(rows).R)

@@ -53,9 +53,9 @@ class Served:
             schema = {name: _object("", _schemas(of)) for name, of in told.items()}
             self._send(topic, "twin.Parameters", schema, window.end, told)
         for alarm in window.alarms:
-            told = {name: getattr(alarm, name) for name in ALARM if name != "text"}
-            told["text"] = live_in_words(alarm)
-            self._send("/twin/alarms", "twin.Alarm", ALARM, window.end, told)
+            entries = {name: getattr(alarm, name) for name in ALARM if name != "text"}
+            entries["text"] = live_in_words(alarm)
+            self._send("/twin/alarms", "twin.Alarm", ALARM, window.end, entries)
 
     def tell_cause(self, cause: LiveCause, time: float) -> None:
         """Serve what a diagnosis named; time: of the log, s."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -21,6 +22,7 @@ from identify.fleet.columns import RECORD, TYPES, Column
 from identify.fleet.engine import needed
 from twin.errors import InputError
 from twin.files import lock, make_folder, write_atomically
+from twin.parallel import cores
 
 NAME = re.compile(r"[0-9a-f]{64}\.parquet")  # of a record: its key
 PACK_FROM = 1000  # records from which they are packed while more are made: each is a file to open
@@ -120,12 +122,12 @@ class Contents:
     def of(cls, store: Store) -> Contents:
         """Look at every file; what is cut short or of another schema is told, and left out."""
         found: dict[Path, list[Path]] = {store.records: [], store.packed: []}
+        paths = [path for folder in found for path in sorted(folder.glob("*.parquet"))]
         faults = []
-        for folder, good in found.items():
-            for path in sorted(folder.glob("*.parquet")):
-                why = fault(path)
+        with ThreadPoolExecutor(cores()) as pool:  # to read the end of a file waits for the disk
+            for path, why in zip(paths, pool.map(fault, paths), strict=True):
                 if why is None:
-                    good.append(path)
+                    found[path.parent].append(path)
                 else:
                     faults.append(f"{path}: {why}; its logs are computed again once it is removed")
         return cls(tuple(found[store.records]), tuple(found[store.packed]), tuple(faults))
@@ -153,7 +155,8 @@ def fault(path: Path) -> str | None:
     return None if found.equals(schema(RECORD)) else "has other columns than a record has"
 
 
-def schema(columns: Iterable[Column]) -> Any:
+@cache
+def schema(columns: tuple[Column, ...]) -> Any:
     """The Arrow schema of columns, without metadata."""
     pa = needed("pyarrow")
     kinds = {c.name: TYPES.get(c.kind) for c in columns}
@@ -162,7 +165,7 @@ def schema(columns: Iterable[Column]) -> Any:
     )
 
 
-def table(rows: Sequence[Row], columns: Iterable[Column]) -> Any:
+def table(rows: Sequence[Row], columns: tuple[Column, ...]) -> Any:
     """Rows as an Arrow table; an entry that a row lacks is null."""
     pa, known = needed("pyarrow"), schema(columns)
     arrays = [pa.array([row.get(f.name) for row in rows], f.type) for f in known]

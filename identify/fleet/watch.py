@@ -12,6 +12,7 @@ from time import monotonic, sleep
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identify.dataset.bodies import bodies_along
 from identify.dataset.given_logs import is_driven, telling_in
@@ -52,6 +53,9 @@ class Source(Protocol):
     def windows(self, length: float) -> Iterator[tuple[float, Log]]:
         """The whole windows of that length (s) that are there by now, with their times."""
         ...
+
+    def close(self) -> None:
+        """Leave it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +140,12 @@ class Watcher:
         return PreparedLog.of(motion, LENGTH)
 
     def _told(
-        self, name: str, logs: Sequence[PreparedLog], left: Array, some: Array, share: float
+        self,
+        name: str,
+        logs: Sequence[PreparedLog],
+        left: Array,
+        some: NDArray[np.bool_],
+        share: float,
     ) -> LiveAxis:
         """An axis by its residual (n,) N in these test functions, of which some (n,) count."""
         axis, errors = self.model.axes[name], self.errors.get(name, [])

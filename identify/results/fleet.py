@@ -13,7 +13,7 @@ from twin.signals import Array
 
 @dataclass(frozen=True)
 class Ingested:
-    """What became of the logs below a folder; told: of bad ones, a line each.
+    """What became of the logs below a folder; told: of bad and unfinished ones, a line each.
 
     fitted and faulty ones have a record now, known ones had one, unfinished ones are being written.
     """

@@ -122,11 +122,11 @@ def test_a_whole_installation_is_one_line_each(tmp_path) -> None:
     said = cli_runs.twin("doctor", folder=tmp_path)
     assert said.returncode == 0
     lines = said.stdout.splitlines()
-    topics = ["twin", "Python", "packages", "importers", "fleet", "cache"]
+    topics = ["twin", "Python", "packages", "importers", "fleet", "live", "cache"]
     topics += ["MuJoCo", "display", "threads"]
     assert [line.split()[1] for line in lines] == topics
-    assert "MuJoCo" in lines[6]
-    assert "runs" in lines[6]
+    assert "MuJoCo" in lines[7]
+    assert "runs" in lines[7]
     found = json.loads(cli_runs.twin("doctor", "--json", folder=tmp_path).stdout)
     assert found["ok"] is True
     assert [line["about"] for line in found["lines"]] == topics
@@ -152,6 +152,7 @@ def test_it_looks_at_every_package_that_the_installation_asks_for() -> None:
         (doctor.NEEDED, project["dependencies"]),
         (doctor.FOR_IMPORT, project["optional-dependencies"]["import"]),
         (doctor.FOR_FLEET, project["optional-dependencies"]["fleet"]),
+        (doctor.FOR_LIVE, project["optional-dependencies"]["live"]),
     ):
         assert set(looked) == {re.split(r"[>=<\[]", line)[0] for line in asked}
 

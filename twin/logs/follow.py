@@ -132,6 +132,9 @@ class Follower:
         except FileNotFoundError:
             return  # its writer has not begun, or begins anew
 
+    def close(self) -> None:
+        """Nothing is open between two looks."""
+
     def _look(self, stream: BinaryIO) -> None:
         """Whether it is the file that was followed."""
         about = os.fstat(stream.fileno())

@@ -19,11 +19,12 @@ from typing import Any
 
 import numpy as np
 from mcap.records import Channel, Schema
+from numpy.typing import NDArray
 
 from twin.errors import InputError
 from twin.installed import pip_install
 from twin.logs.follow import Incoming
-from twin.logs.log import Array, Log
+from twin.logs.log import Log
 from twin.logs.topics import MessageLayout, Topic, sample_times, seconds, tag
 
 PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
@@ -246,7 +247,9 @@ def _schema(number: int, told: Mapping[str, Any]) -> Schema:
     return Schema(id=number, name=told.get("schemaName") or "", encoding=encoding, data=data)
 
 
-def _records(layout: MessageLayout, payloads: Sequence[bytes], first: int, times: Array) -> bytes:
+def _records(
+    layout: MessageLayout, payloads: Sequence[bytes], first: int, times: NDArray[np.int64]
+) -> bytes:
     """Messages as they lie in the chunk of a log; times in ns."""
     records = np.repeat(layout.template, len(payloads))
     records[".sequence"] = np.arange(first, first + len(payloads)).astype(np.uint32)

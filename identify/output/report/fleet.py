@@ -189,9 +189,11 @@ def _lines(course: Course, alarms: Sequence[Alarm]) -> list[Drawn]:
     within = np.clip(course.half, 0.0, high - low)  # else one night would leave nothing to be seen
     lines = []
     if np.isfinite(within).any() and np.nanmax(within) > 0.0:
-        band = "90 % band within the log"
-        edges = (course.values + within, course.values - within)
-        lines += [Drawn(band, scale(edge), Line.BAND) for edge in edges]
+        edges = {"high": course.values + within, "low": course.values - within}
+        lines += [
+            Drawn(f"90 % band within the log, {end} end", scale(edge), Line.BAND)
+            for end, edge in edges.items()
+        ]
     lines.append(Drawn("as fitted", scale(course.values), ink=Ink.SOFT))
     if not np.array_equal(course.alone, course.values, equal_nan=True):
         lines.append(Drawn("less what all machines do", scale(course.alone)))

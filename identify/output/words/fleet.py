@@ -95,7 +95,8 @@ def state_in_words(state: MachineState) -> str:
     """What a machine needs attention for, in a few words."""
     parts = [named(a.parameter) for a in state.alarms]
     parts += [f"{named(o.parameter)} off from its kind" for o in state.off]
-    parts += [f"{state.faulty} bad logs"] if state.faulty else []
+    bad = f"{state.faulty} bad log{'s' if state.faulty > 1 else ''}"
+    parts += [bad] if state.faulty else []
     return ", ".join(dict.fromkeys(parts)) or NOTHING
 
 

@@ -71,7 +71,9 @@ def test_what_is_known_is_not_made_again_and_the_same_elsewhere(first, tmp_path)
 def test_a_log_that_is_being_written_is_left_for_later(first, tmp_path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(first.read_bytes()[:-100])
-    assert made(path, tmp_path / "store") == (State.UNFINISHED, [])
+    done = ingested(tmp_path, tmp_path / "store")
+    assert (done.unfinished, rows(tmp_path / "store")) == (1, [])
+    assert done.told == ("a.mcap: is still being written; it is left for the next time",)
     shutil.copy(first, path)
     assert made(path, tmp_path / "store")[0] is State.FITTED
 
