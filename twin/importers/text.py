@@ -63,6 +63,8 @@ class Style:
         except ValueError:
             if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
                 return self.value(re.sub("[dD]", "e", cell))
+            if re.fullmatch(r"[-+]?0[xX][\da-fA-F]+", cell):  # of a register: 0x1A2B
+                return float(int(cell, 16))
             if (found := _WITH_UNIT.fullmatch(cell)) is not None:
                 return self.value(found[1]) * _SECONDS[found[2]]
             other = "." if self.decimal == "," else ","
