@@ -69,6 +69,10 @@ class BadCells:
         """A cell is a NaN, which is told beside others that are bad."""
         self._not_finite.append((row, column))
 
+    def pass_rows(self, count: int) -> None:
+        """So many rows have no bad cell."""
+        self._rows += count
+
     def end_row(self, row: Row, read: Sequence[int]) -> None:
         """All cells of a row were looked at."""
         if self._bad_here:

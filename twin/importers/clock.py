@@ -18,6 +18,7 @@ from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable
 from twin.importers.time_base import (
+    order_of,
     rate_of_rounded,
     repeated_rows,
     rows_a_stamp,
@@ -237,7 +238,8 @@ def _of_times(
     lines += [f"# {text}" for text in time.said]
     lines += [f"# or: time = {other.entry} # rises by {other.step:.6g} s"
               for other in found if other is not time and other.duration > 0.0]  # fmt: skip
-    steps = np.diff(time.seconds)
+    order = order_of(time.seconds)
+    steps = np.diff(time.seconds if order is None else time.seconds[order])
     again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
     off = np.abs(np.delete(steps, again - 1) - time.step)
     if len(off) and off.max() > 0.01 * time.step:  # what is less even needs resample

@@ -28,6 +28,7 @@ from twin.importers.table import SignalTable, numbers
 from twin.importers.time_base import (
     TimeBase,
     even_times,
+    order_of,
     rate_of,
     repeated_rows,
     time_base_of,
@@ -233,6 +234,11 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
         said += jumps
         _common_length({**columns, mapping.time.name: times})
         facts |= _start(table, raw, times)
+        if (order := order_of(times)) is not None:
+            first = int(np.argmax(np.diff(times) < 0.0)) + 2
+            out = np.count_nonzero(np.diff(times) < 0.0)
+            times, columns = times[order], {n: c[order] for n, c in columns.items()}
+            said.append(f"rows out of order in {out} places, the first row {first}; put in order")
         if holes:
             good = np.all([np.isfinite(c) for c in columns.values()], axis=0)
             times, columns = times[good], {n: c[good] for n, c in columns.items()}

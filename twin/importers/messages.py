@@ -13,6 +13,7 @@ from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -92,23 +93,24 @@ class _Series:
     aliases: dict[str, tuple[int, str]] = field(default_factory=dict)
     plain: dict[tuple[str, ...], list[array | None]] = field(default_factory=dict)
 
-    def add_plain(self, message: Mapping[str, Any], time: int, part: int) -> bool:
-        """Take a message of numbers alone as one before it was taken; False where none was so."""
-        targets = self.plain.get(tuple(message))
-        if targets is None:
+    def add_plain(self, messages: Sequence[Any], times: Sequence[int], part: int) -> bool:
+        """Take messages of numbers alone as one before was taken; False where they are not so."""
+        keys = tuple(messages[0]) if type(messages[0]) is dict else ()
+        targets = self.plain.get(keys)
+        if targets is None or any(type(m) is not dict or tuple(m) != keys for m in messages):
             return False
         try:
-            values = array("d", message.values())
+            values = array("d", chain.from_iterable(m.values() for m in messages))
         except (TypeError, OverflowError):
             return False
         count = len(self.times)
         if any(t is not None and len(t) != count for t in targets):
             return False
-        for target, value in zip(targets, values, strict=True):
+        for place, target in enumerate(targets):
             if target is not None:
-                target.append(value)
-        self.times.append(time)
-        self.parts.append(part)
+                target.extend(values[place :: len(keys)])
+        self.times.extend(times)
+        self.parts.extend([part] * len(times))
         return True
 
     def know_plain(self, message: Mapping[str, Any], values: Values) -> None:
@@ -180,15 +182,25 @@ class Messages:
 
     def add(self, publisher: object, topic: str, message: Any, time: int, part: int = 0) -> None:
         """Take a message; time: ns, of its recording. message: None where it cannot be read."""
+        self.add_all(publisher, topic, [message], [time], part)
+
+    def add_all(
+        self, publisher: object, topic: str, messages: Sequence[Any], times: Sequence[int],
+        part: int,
+    ) -> None:  # fmt: skip
+        """Take messages of one publisher that follow each other, as ``add`` does each."""
         series = self._series.get(publisher)
         if series is None:
             self._publishers[topic] += 1
             number = self._publishers[topic]
             series = _Series(topic if number == 1 else f"{topic}#{number}")
             self._series[publisher] = series
-        is_dict = type(message) is dict
-        if is_dict and series.add_plain(message, time, part):
-            return
+        if messages and not series.add_plain(messages, times, part):
+            for message, time in zip(messages, times, strict=True):
+                if not series.add_plain([message], [time], part):
+                    self._add_one(series, message, time, part)
+
+    def _add_one(self, series: _Series, message: Any, time: int, part: int) -> None:
         aliases: Aliases = {}
         values = of_message(series.prefix, message, (), aliases)
         series.require_order(aliases, self.wanted)
@@ -199,7 +211,7 @@ class Messages:
             for key in aliases:  # who has names needs no numbers, which may be others' ones
                 values.pop(key, None)
         series.add(values, time, part)
-        if is_dict:
+        if type(message) is dict:
             series.know_plain(message, values)
 
     def table(self, lost: Sequence[str], unread: Sequence[str]) -> SignalTable:

@@ -16,9 +16,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from operator import methodcaller
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +37,7 @@ _MARKS = (
 _SECONDS = {"sec": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "hr": 3600.0}
 _WITH_UNIT = re.compile(rf"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s+({'|'.join(_SECONDS)})")  # of MATLAB
 _ENDS = re.compile(r"\r\n|\r|\n")
+_BLOCK = 1024  # lines read at once: few enough that one bad cell makes few of them slow
 
 
 @dataclass(frozen=True)
@@ -64,6 +63,8 @@ class Style:
         except ValueError:
             if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
                 return self.value(re.sub("[dD]", "e", cell))
+            if re.fullmatch(r"[-+]?0[xX][\da-fA-F]+", cell):  # of a register: 0x1A2B
+                return float(int(cell, 16))
             if (found := _WITH_UNIT.fullmatch(cell)) is not None:
                 return self.value(found[1]) * _SECONDS[found[2]]
             other = "." if self.decimal == "," else ","
@@ -202,16 +203,6 @@ class Layout:
             return "number"
         return "stamp" if is_stamp(cell) else "date" if is_date(cell) else "text"
 
-    def plain(self, stream: TextIO) -> Iterable[str]:
-        """The rows of an open file with a point as decimal sign."""
-        rows: Iterable[str] = itertools.islice(stream, self.skip, None)
-        if (end := self.end) is not None:
-            rows = itertools.takewhile(lambda line: not line.startswith(end), rows)
-        if self.is_row is not None:
-            rows = filter(self.is_row, rows)
-        comma = self.style.decimal == ","
-        return map(methodcaller("replace", ",", "."), rows) if comma else rows
-
     def lines(self, path: Path) -> Generator[tuple[int, str]]:
         """The rows of a file with the number of each line, as they are written."""
         with open(path, encoding=self.encoding, errors="replace") as stream:
@@ -232,12 +223,8 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
     if asked and text:
         raise InputError(_of_text(layout, *next(iter(text.items()))))
     where = [k for name, k in places.items() if name not in text]
-    said = layout.said
-    try:
-        read = _by_numpy(path, layout, where)
-    except ValueError:
-        read, more = _row_by_row(path, layout, where, every=not asked)
-        said = (*said, *more)
+    read, more = _rows(path, layout, where, every=not asked)
+    said = (*layout.said, *more)
     for k in text.values():
         first = next((row[k] for row in layout.rows if k < len(row)), "")
         read[k] = np.array([first])
@@ -272,59 +259,96 @@ def _dates_of(wanted: Iterable[str], layout: Layout, names: Sequence[str]) -> di
     return {names[k]: k for k, kind in enumerate(layout.kinds) if kind == "date"}
 
 
-def _by_numpy(path: Path, layout: Layout, where: Sequence[int]) -> dict[int, NDArray]:
-    """The columns at some places; raises ValueError where any cell is not what it must be."""
-    stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
-    with open(path, encoding=layout.encoding, errors="replace") as stream:
-        values = np.loadtxt(
-            layout.plain(stream), delimiter=layout.style.delimiter, usecols=where, comments=None,
-            quotechar='"',
-            dtype=np.dtype([(str(k), "i8" if k in stamps else "f8") for k in where]), ndmin=1,
-            encoding=None, converters={k: own.add for k, own in stamps.items()},
-        )  # fmt: skip
-    columns = {k: np.ascontiguousarray(values[str(k)]) for k in where}
-    return {k: stamps[k].times(c) if k in stamps else c for k, c in columns.items()}
-
-
-def _row_by_row(
+def _rows(
     path: Path, layout: Layout, where: Sequence[int], every: bool
 ) -> tuple[dict[int, NDArray], tuple[str, ...]]:
-    """The same where some lines are no rows, and sentences about those that were left out.
+    """The columns at some places, and sentences about the lines that are no rows.
 
     every: all columns are read to be looked at, so that what is no number is NaN there. Raises
     InputError that names all bad cells.
     """
-    stamps = {k: Stamps(layout.kinds[k]) for k in where if layout.kinds[k] in ("stamp", "date")}
-    bad = BadCells(layout.names, len(layout.names))
-    header = _header_cells(path, layout)
-    columns: dict[int, list[float]] = {k: [] for k in where}
+    rows = _Rows(layout, where, _header_cells(path, layout))
     with closing(layout.lines(path)) as lines:
-        for number, line in lines:
-            cells = layout.style.cells(line)
+        while block := list(itertools.islice(lines, _BLOCK)):
+            rows.add(block)
+    bad, left_out = rows.bad, rows.bad.left_out()
+    if not every or bad.has_header or any(k in bad.columns for k in rows.stamps):
+        bad.require_none(left_out)
+    return rows.columns(left_out.rows), left_out.said
+
+
+class _Rows:
+    """The rows of a table as they are read, in blocks: by NumPy, a block with a bad cell by hand.
+
+    where: the places of the columns. header: the cells of the names, which may come again.
+    """
+
+    def __init__(self, layout: Layout, where: Sequence[int], header: list[str] | None) -> None:
+        self._layout, self._where, self._header = layout, where, header
+        kinds = layout.kinds
+        self.stamps = {k: Stamps(kinds[k]) for k in where if kinds[k] in ("stamp", "date")}
+        self.bad = BadCells(layout.names, len(layout.names))
+        self._type = np.dtype([(str(k), "i8" if k in self.stamps else "f8") for k in where])
+        self._blocks: list[NDArray] = []
+
+    def add(self, block: Sequence[tuple[int, str]]) -> None:
+        """Read some lines, each with its number."""
+        values = self._by_numpy([line for _, line in block if not line.isspace()])
+        if values is None:
+            values = self._one_by_one(block)
+        else:
+            self.bad.pass_rows(len(values))
+        self._blocks.append(values)
+
+    def columns(self, left_out: Sequence[int]) -> dict[int, NDArray]:
+        """The columns (n,) without some rows."""
+        values = np.delete(np.concatenate([np.zeros(0, self._type), *self._blocks]), left_out)
+        read = {k: np.ascontiguousarray(values[str(k)]) for k in self._where}
+        return {k: self.stamps[k].times(c) if k in self.stamps else c for k, c in read.items()}
+
+    def _by_numpy(self, lines: Sequence[str]) -> NDArray | None:
+        """The rows of a block; None where any cell is not what it must be."""
+        if not lines:
+            return np.zeros(0, self._type)
+        style = self._layout.style
+        if style.decimal == ",":
+            lines = [line.replace(",", ".") for line in lines]
+        try:
+            values = np.loadtxt(
+                lines, delimiter=style.delimiter, usecols=self._where, comments=None,
+                quotechar='"', dtype=self._type, ndmin=1, encoding=None,
+                converters={k: own.add for k, own in self.stamps.items()},
+            )  # fmt: skip
+        except ValueError:
+            return None
+        numbers = (values[str(k)] for k in self._where if k not in self.stamps)
+        return values if all(np.isfinite(c).all() for c in numbers) else None
+
+    def _one_by_one(self, block: Sequence[tuple[int, str]]) -> NDArray:
+        """The rows of a block; a cell that is not what it must be is NaN, or no time."""
+        read: list[tuple[float, ...]] = []
+        for number, line in block:
+            cells = self._layout.style.cells(line)
             if not any(cells):
                 continue
-            if header is not None and cells == header:
-                bad.add_header(number)
+            if self._header is not None and cells == self._header:
+                self.bad.add_header(number)
                 continue
             row = Row(number, line, cells)
-            for k in where:
-                cell = cells[k] if k < len(cells) else ""
-                try:
-                    value = stamps[k].add(cell) if k in stamps else layout.style.value(cell)
-                    columns[k].append(value)
-                    if not isfinite(value):
-                        bad.add_not_finite(row, k)
-                except ValueError:
-                    bad.add(row, k)
-                    columns[k].append(-1 if k in stamps else np.nan)
-            bad.end_row(row, where)
-    left_out = bad.left_out()
-    kept = np.setdiff1d(np.arange(len(columns[where[0]])), left_out.rows)
-    if not every or bad.has_header or any(k in bad.columns for k in stamps):
-        bad.require_none(left_out)
-    read: dict[int, NDArray] = {k: np.array(c)[kept] for k, c in columns.items() if k not in stamps}
-    read |= {k: own.times(np.array(columns[k], np.int64)[kept]) for k, own in stamps.items()}
-    return read, left_out.said
+            read.append(tuple(self._value(row, k) for k in self._where))
+            self.bad.end_row(row, self._where)
+        return np.array(read, self._type)
+
+    def _value(self, row: Row, place: int) -> float:
+        cell, stamps = row.cell(place), self.stamps.get(place)
+        try:
+            value = self._layout.style.value(cell) if stamps is None else stamps.add(cell)
+        except ValueError:
+            self.bad.add(row, place)
+            return np.nan if stamps is None else -1
+        if not isfinite(value):
+            self.bad.add_not_finite(row, place)
+        return value
 
 
 def _header_cells(path: Path, layout: Layout) -> list[str] | None:

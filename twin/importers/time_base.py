@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.importers.counters import and_more, clock_jumps, without_jumps
 from twin.importers.mapping import ImportMap
-from twin.importers.table import numbers
+from twin.importers.table import MOST_NAMED, numbers
 from twin.logs.log import Array
 from twin.logs.topics import instant
 from twin.numbers import first_not_finite
@@ -51,6 +51,43 @@ def _shown(value: np.generic) -> str:
     if value.dtype.kind == "m":
         return str(value.astype("timedelta64[us]").item())
     return f"{value:.12g}"
+
+
+def order_of(times: Array) -> NDArray[np.intp] | None:
+    """The rows (n,) by their times (n,) in s, where they are but out of order; None where not.
+
+    In order they are as even as they are where they rise; two recordings that lie over each other,
+    or a clock that was put back, are not.
+    """
+    steps = np.diff(times)
+    if not np.isfinite(times).all() or (steps >= 0.0).all() or not (steps > 0.0).any():
+        return None
+    order = np.argsort(times, kind="stable")
+    usual, sorted_ = float(np.median(steps[steps > 0.0])), np.diff(times[order])
+    few, near = 0.1, 5.0  # share of rows out of place; steps by which two may differ that are even
+    moved = np.mean(order != np.arange(len(order)))
+    even = bool((sorted_ > 0.5 * usual).all()) and sorted_.max() < near * usual
+    return order if even and moved < few else None
+
+
+def _require_no_return(times: Array) -> None:
+    """Raise InputError that names every place where times (n,) in s fall back by far."""
+    steps = np.diff(times)
+    if not (steps > 0.0).any():
+        return
+    far = 20.0  # usual steps; by less the rows of a recorder that was busy fall back
+    rows = np.flatnonzero(steps < -far * np.median(steps[steps > 0.0])) + 1
+    if not len(rows):
+        return
+    places = [
+        f"row {k + 1} ({instant(times[k - 1])} is followed by {instant(times[k])})"
+        for k in rows[:MOST_NAMED]
+    ]
+    more = f" and {len(rows) - MOST_NAMED} more" if len(rows) > MOST_NAMED else ""
+    raise InputError(
+        f"the time falls back in {', '.join(places)}{more}: the clock was put back, or several "
+        "recordings are in one file; cut it there and import each part as a log of its own"
+    )
 
 
 def repeated_rows(columns: Mapping[str, Array], time: Array) -> NDArray[np.intp]:
@@ -122,6 +159,7 @@ def rate_of(time: Array) -> float:
     """
     jitter = 0.01  # of a period: how far a time may be off the even grid
     _require_finite(time)
+    _require_no_return(time)
     elapsed = time - time[0]
     steps = np.diff(elapsed)
     period = float(np.median(steps))
@@ -219,6 +257,7 @@ class TimeBase:
 def time_base_of(time: Array, rate: float) -> TimeBase:
     """The even time base of ``rate`` Hz over the times (n,) in s; raises InputError."""
     _require_finite(time)
+    _require_no_return(time)
     increasing = time > np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
     rows = np.flatnonzero(increasing)
     kept = time[rows]

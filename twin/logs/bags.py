@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, Metadata, Schema, Statistics
@@ -45,8 +46,7 @@ _OPCODES = frozenset(Opcode)
 _WINDOW = 1 << 18  # bytes that are searched for a chunk at a time
 
 
-@dataclass(frozen=True)
-class BagMessage:
+class BagMessage(NamedTuple):  # of which a bag has millions
     """A message: its channel, schema (None: none) and number, log and publish time in ns, and data.
 
     part: of how many damaged places it is behind; messages of one part follow each other.
@@ -94,9 +94,11 @@ class Bag:
                     self._lose(record.offset, record.end, str(error), record)
                     continue
                 for opcode, content in found:
-                    yield from self._taken(opcode, content)
+                    if (message := self._taken(opcode, content)) is not None:
+                        yield message
             elif record.opcode in IN_CHUNKS:
-                yield from self._taken(record.opcode, record.content)
+                if (message := self._taken(record.opcode, record.content)) is not None:
+                    yield message
             else:
                 self._keep(record)
         read = self._read.total()
@@ -105,21 +107,22 @@ class Bag:
                 self.lost.append(f"{all_ - read} of {all_} messages that its statistics announce")
             self.lost.append(f"of {all_} messages {read} were read")
 
-    def _taken(self, opcode: int, content: bytes) -> Iterator[BagMessage]:
+    def _taken(self, opcode: int, content: bytes) -> BagMessage | None:
+        """The message in a record; None where it has none."""
         if opcode != Opcode.MESSAGE:
             self._topics.register(opcode, content)
-            return
+            return None
         if len(content) < _MESSAGE_HEAD.size:
             raise Damaged(f"a message of {len(content)} bytes, which is too short")
         number, sequence, logged, published = _MESSAGE_HEAD.unpack_from(content)
         if (channel := self._topics.channels.get(number)) is None:
             self.lost.append(f"messages of channel {number}, which is not defined")
-            return
+            return None
         self._last = logged
         self._read[number] += 1
         schema = self._topics.schemas.get(channel.schema_id)
         data = content[_MESSAGE_HEAD.size :]
-        yield BagMessage(channel, schema, sequence, logged, published, data, self._part)
+        return BagMessage(channel, schema, sequence, logged, published, data, self._part)
 
     def _keep(self, record: Record) -> None:
         """Take what lies beside the messages."""

@@ -243,3 +243,12 @@ def test_messages_of_ros_1_and_of_either_order_of_bytes(tmp_path, encoding):
     log = imported(path, text)
     assert log.sample_rate == 500.0
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q[:200], atol=1e-12)
+
+
+def test_a_message_that_is_none_is_named_though_many_are_decoded_at_once(tmp_path, monkeypatch):
+    path = tmp_path / "a.mcap"
+    real = json.dumps
+    monkeypatch.setattr(json, "dumps", lambda m: real(m) if m["t"] != T[700] else '{"t": 1}, 2')
+    write_bag(path)
+    with pytest.raises(InputError, match=f"on /drive at {EPOCH + 1_400_000_000} ns cannot be read"):
+        imported(path)

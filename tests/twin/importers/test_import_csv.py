@@ -180,3 +180,27 @@ def test_stamps_of_no_kind_ask_for_the_rate_and_hinder_no_proposal(tmp_path: Pat
     with pytest.raises(InputError, match=r"'t' holds text, such as 'at noon .* sample_rate \(Hz\)"):
         imported(tmp_path, text, CLOCKED)
     assert "# sample_rate = ? # Hz: NOT KNOWN" in guess_map(tmp_path / "log.csv").text
+
+
+def test_bad_cells_far_apart_are_told_at_once_by_line_and_blocks_between_are_read(tmp_path):
+    rows = [f"{0.001 * k:.3f},{k % 97},{k % 7}.5,0" for k in range(5000)]
+    for k, cell in ((10, "x"), (2500, "nan"), (4990, "?")):
+        t, _, i, unused = rows[k].split(",")
+        rows[k] = f"{t},{cell},{i},{unused}"
+    with pytest.raises(InputError, match=r"^.*3 cells .* line 12, .* line 2502, .* line 4992"):
+        imported(tmp_path, "\n".join([HEADER, *rows]))
+    rows[10], rows[2500], rows[4990] = rows[11], "# a pause", rows[4991]
+    log = imported(tmp_path, "\n".join([HEADER, *rows]))
+    assert len(log) == 4999
+    assert told_of(log) == ["line 2502 is a comment and left out: '# a pause'"]
+
+
+def test_counts_in_hexadecimals_are_read(tmp_path):
+    counts = np.arange(-50, 50)
+    rows = [f"0x{k & 0xFFFF:04X},{0.5 * k}" for k in counts]
+    log = imported(
+        tmp_path, "\n".join(["q,i", *rows]),
+        'sample_rate = 1e3\n[axes.x]\nposition = {column = "q", unit = "um", wraps = 65536}\n'
+        'force = {column = "i", unit = "N"}\n',
+    )  # fmt: skip
+    np.testing.assert_allclose(log.axes["x"].position, 1e-6 * counts, atol=1e-12)

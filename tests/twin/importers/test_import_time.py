@@ -226,3 +226,26 @@ def test_stamps_as_text_in_other_formats(tmp_path):
         assert log.sample_rate == 250.0
         assert "start_time_unix_ns" in log.metadata
         assert 'time = {column = "t", unit = "s"}' in guess_map(tmp_path / "a.json").text
+
+
+def clocked(times: np.ndarray, rows_: np.ndarray) -> str:
+    """A table whose rows stand in that order."""
+    return "t,q,f\n" + "".join(f"{times[k]:.4f},{Q[k]:.9g},{F[k]:.9g}\n" for k in rows_)
+
+
+def test_rows_out_of_order_are_put_in_order_and_said(tmp_path):
+    order = np.arange(COUNT)
+    order[100:102] = [101, 100]
+    order[400:403] = [402, 400, 401]
+    text = clocked(T, order)
+    log = imported(tmp_path, text)
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, atol=1e-11)
+    assert told_of(log) == ["rows out of order in 2 places, the first row 102; put in order"]
+    assert "\nresample" not in guess_map(tmp_path / "a.csv").text
+
+
+@pytest.mark.parametrize("resample", ["", "resample = 250.0\n"])
+def test_every_place_where_the_clock_was_put_back_is_told(tmp_path, resample):
+    text = clocked(np.concatenate([T[:250], T[:200], T[:150]]), np.arange(COUNT))
+    with pytest.raises(InputError, match=r"falls back in row 251 .* row 451 \(0\.796 s .*: the"):
+        imported(tmp_path, text, clock=f'{resample}time = {{column = "t", unit = "s"}}')

@@ -6,7 +6,8 @@ Of a bag that was cut off, has no summary or is damaged somewhere, what whole ch
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,27 +21,74 @@ from twin.logs.bags import BagMessage, open_bag
 
 Decoder = Callable[[bytes], Any]
 READ = "json, protobuf, cdr and ros1"
+_BATCH = 2048  # messages of a channel that are decoded at once
 
 
 def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of an MCAP file; raises InputError."""
     wanted = mapping.column_names()
     messages = Messages(wanted)
-    decoders: dict[int, Decoder | None] = {}
-    unread: dict[str, None] = {}
+    channels: dict[int, _Channel] = {}
     with parsing("MCAP"), open_bag(path) as bag:
         for m in bag.messages():
-            if not messages.is_wanted(m.channel.id, m.channel.topic):
+            channel = channels.get(m.channel.id)
+            if channel is None:
+                channel = channels[m.channel.id] = _Channel(m, _decoder(m))
+                channel.hand_to(messages, [m])  # so that the first of a topic is known as such
+                channel.wanted = messages.is_wanted(m.channel.id, m.channel.topic)
                 continue
-            if m.channel.id not in decoders:
-                decoders[m.channel.id] = _decoder(m)
-                if decoders[m.channel.id] is None:
-                    unread[_unread(m)] = None
-            decode = decoders[m.channel.id]
-            message = _decoded(m, decode) if decode else None
-            messages.add(m.channel.id, m.channel.topic, message, m.log_time, m.part)
+            if not channel.wanted:
+                continue
+            if channel.waiting and channel.waiting[0].part != m.part:
+                channel.empty_to(messages)
+            channel.waiting.append(m)
+            if len(channel.waiting) == _BATCH:
+                channel.empty_to(messages)
+        for channel in channels.values():
+            channel.empty_to(messages)
         lost = tuple(dict.fromkeys(bag.lost))
+    unread = dict.fromkeys(_unread(c.first) for c in channels.values() if c.decode is None)
     return messages.table(lost, tuple(unread))
+
+
+@dataclass
+class _Channel:
+    """A channel: its first message, what reads its messages (None: nothing), those not yet read.
+
+    wanted: whether more than the first is asked for.
+    """
+
+    first: BagMessage
+    decode: Decoder | None
+    wanted: bool = True
+    waiting: list[BagMessage] = field(default_factory=list)
+
+    def empty_to(self, messages: Messages) -> None:
+        """Hand on what waits."""
+        if self.waiting:
+            self.hand_to(messages, self.waiting)
+            self.waiting = []
+
+    def hand_to(self, messages: Messages, batch: Sequence[BagMessage]) -> None:
+        """Decode messages of one part and hand them on; raises InputError."""
+        first, decode = batch[0], self.decode
+        decoded: Sequence[Any]
+        if decode is None:
+            decoded = [None] * len(batch)
+        else:
+            joined = _joined_json(batch) if decode is json.loads else None
+            decoded = joined or [_decoded(m, decode) for m in batch]
+        times = [m.log_time for m in batch]
+        messages.add_all(first.channel.id, first.channel.topic, decoded, times, first.part)
+
+
+def _joined_json(batch: Sequence[BagMessage]) -> list[Any] | None:
+    """Messages read as one array, twice as fast; None where they must be read one by one."""
+    try:
+        read = json.loads(b"[" + b",".join(m.data for m in batch) + b"]")
+    except ValueError:
+        return None
+    return read if len(read) == len(batch) else None
 
 
 def _decoder(m: BagMessage) -> Decoder | None:
