@@ -60,7 +60,9 @@ export const recordings = {
         h("tbody", {}, ...rows))),
       h("datalist", { id: "units" }, ...UNITS.map(u => h("option", { value: u }))),
       lacks.length ? this.asking(found, lacks) : null,
-      h("div", { class: "row" }, all, first),
+      h("div", { class: "row" }, all, first, ending(this.chosen) === "mcap" ? h("button", { id: "take", disabled: busy,
+        onclick: () => run("project", "take", ...[this.chosen, ...others].filter(n => ending(n) === "mcap")) },
+      `Take ${others.length ? `all ${others.length + 1}` : "it"} in as ${others.length ? "they are" : "it is"}: logs of twin`) : null),
       h("p", { class: "soft" }, "Nothing is copied but what is imported; the files stay as they are."),
     ];
   },

@@ -11,17 +11,15 @@ from cli_runs import twin
 
 from identify.project.folder import Folder
 
-T = np.arange(6000) / 1000.0
 
-
-def recorded(path: Path, rate: float, seed: int, name: str = "pos") -> Path:
-    """6 s of a mass of 5 kg with Coulomb friction and a spring of 40 N/m."""
-    noise = np.random.default_rng(seed)
-    x = 0.05 * np.sin(rate * T) + 0.02 * np.sin(2.6 * rate * T)
-    a = -(rate**2) * (0.05 * np.sin(rate * T) + 0.1352 * np.sin(2.6 * rate * T))
-    force = 5.0 * a + 2.1 * np.sign(np.gradient(x)) + 40.0 * x + noise.normal(0.0, 0.05, len(T))
-    columns = np.column_stack([T, 1e3 * x + noise.normal(0.0, 1e-4, len(T)), force])
-    np.savetxt(path, columns, "%.9g", ",", header=f"time_s,{name}_mm,force_N", comments="")
+def recorded(path: Path, rate: float, seed: int, seconds: int = 6) -> Path:
+    """A mass of 5 kg with Coulomb friction and a spring of 40 N/m, at 1 kHz."""
+    noise, t = np.random.default_rng(seed), np.arange(1000 * seconds) / 1000.0
+    x = 0.05 * np.sin(rate * t) + 0.02 * np.sin(2.6 * rate * t)
+    a = -(rate**2) * (0.05 * np.sin(rate * t) + 0.1352 * np.sin(2.6 * rate * t))
+    force = 5.0 * a + 2.1 * np.sign(np.gradient(x)) + 40.0 * x + noise.normal(0.0, 0.05, len(t))
+    columns = np.column_stack([t, 1e3 * x + noise.normal(0.0, 1e-4, len(t)), force])
+    np.savetxt(path, columns, "%.9g", ",", header="time_s,pos_mm,force_N", comments="")
     return path
 
 
@@ -90,7 +88,7 @@ def test_the_walk_from_three_files_to_the_added_effect(tmp_path):
 def test_a_killed_worker_and_an_edit_from_outside_are_told_in_the_page(tmp_path):
     folder = tmp_path / "machine"
     folder.mkdir()
-    files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k)) for k in range(2)]
+    files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k, 60)) for k in range(2)]
     with served(folder) as address, browsed() as context:
         page = context.new_page()
         page.goto(address)
