@@ -57,7 +57,7 @@ function showJob() {
     if (page.says) rows.push(h("div", { class: "bad" }, h("span", {}, page.says),
       h("button", { onclick: () => say(null) }, "Close")));
     if (running) rows.push(h("div", {}, h("span", {}, h("b", {}, running.command), " ",
-      running.progress ?? "begins"), h("button", { id: "stop", onclick: () => stop(running) }, "Stop")));
+      running.progress?.replace(/; ahead: [^(]*/, " ") ?? "begins"), h("button", { id: "stop", onclick: () => stop(running) }, "Stop")));
     else if (last) rows.push(ended(last));
     if (!running && worker) rows.push(h("div", {}, h("span", {}, `outside this page runs: ${worker}`)));
     for (const job of waiting) rows.push(h("div", {}, h("span", {}, `waits: ${job.command}`),
