@@ -71,7 +71,7 @@ $(VENV)/runtime: pyproject.toml
 	@touch $@
 
 $(VENV)/tests: $(VENV)/runtime
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev --editable ".[fleet,import,live,view]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev --editable ".[app,fleet,import,live,view]"
 	@touch $@
 
 $(VENV)/benchmarks: $(VENV)/tests

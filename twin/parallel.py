@@ -18,6 +18,7 @@ from typing import Literal, TypeVar
 from twin.threads import one_for_matrices
 
 Progress = Callable[[str, int, int], None]  # what is being done, how much of it, of how much
+AHEAD = "ahead: "  # begins what is told beside that, of nothing (0 of 0): who is ahead so far
 
 
 def silent(what: str, done: int, total: int) -> None:

@@ -25,6 +25,11 @@ class MapProof:
     units: AxisUnits
     has_force: bool
 
+    @property
+    def mass(self) -> float | None:
+        """The moved mass, kg (kg m^2); None where it is not told."""
+        return None if self.values is None else self.values.mass
+
 
 def proofs_of(log: Log) -> Mapping[str, MapProof]:
     """The proof of each axis that has a position and a force or current."""

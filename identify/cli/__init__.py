@@ -12,12 +12,23 @@ from typing import Any
 
 from typer.main import get_command
 
-from identify.cli import doctor, fleet, importing, live, loop, machine, project
+from identify.cli import browser, doctor, fleet, importing, live, loop, machine, project
 from identify.cli.shared import app
 from twin.errors import InputError
 from twin.threads import VARIABLES
 
-__all__ = ["app", "doctor", "fleet", "importing", "live", "loop", "machine", "main", "project"]
+__all__ = [
+    "app",
+    "browser",
+    "doctor",
+    "fleet",
+    "importing",
+    "live",
+    "loop",
+    "machine",
+    "main",
+    "project",
+]
 
 ANYTHING = {"ignore_unknown_options": True, "allow_extra_args": True}
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -30,7 +31,7 @@ from typer.core import TyperCommand
 from identify.cli.in_project import abandoned, filled, working
 from twin.errors import InputError, Unwritten
 from twin.files import is_same_file, require_writable
-from twin.parallel import Progress, silent
+from twin.parallel import AHEAD, Progress, silent
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -198,6 +199,7 @@ def _files(given: Any) -> Iterator[Path]:
 # --- what it is doing -----------------------------------------------------------------------------
 
 FIRST, EVERY = 5.0, 10.0  # s until the first line, and from one to the next
+OFTEN = "TWIN_PROGRESS"  # variable with the s of both, for a program that reads the lines
 
 
 @dataclass(frozen=True)
@@ -249,8 +251,12 @@ class Shown:
     def __init__(self) -> None:
         self.begun = monotonic()
         self.part = Progressed("starting", 0, 0, 0, self.begun, self.begun)
+        self.ahead = ""
 
     def __call__(self, what: str, done: int, total: int) -> None:
+        if total == 0:
+            self.ahead = f"; {what[what.rfind(AHEAD) :]}" if AHEAD in what else self.ahead
+            return
         same = what == self.part.what and total == self.part.total and done > self.part.done
         now = monotonic()
         self.part = (
@@ -261,12 +267,15 @@ class Shown:
 
     def __str__(self) -> str:
         now = monotonic()
-        return f"{self.part.words(now)} ({roughly(now - self.begun)} so far)"
+        return f"{self.part.words(now)}{self.ahead} ({roughly(now - self.begun)} so far)"
 
 
 @contextmanager
 def progress_on_stderr(first: float = FIRST, every: float = EVERY) -> Iterator[Progress]:
     """Progress on standard error: a bar on a terminal, else lines; first, every: s between them."""
+    if asked := os.environ.get(OFTEN):
+        with suppress(ValueError):
+            first = every = max(float(asked), 0.1)
     if sys.stderr is None:  # closed by who started the command
         yield silent
         return

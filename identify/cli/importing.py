@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +16,7 @@ from identify.cli.shared import app, was_kept, written
 from twin.errors import InputError
 
 if TYPE_CHECKING:
+    from identify.analysis.map_proof import MapProof
     from twin.importers.guess import Proposal
     from twin.importers.mapping import ImportMap
     from twin.importers.proposal.text import Answers, Need
@@ -66,15 +67,19 @@ def import_(
 
 def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
     """A log by the map of a user, with what its signals say against it."""
+    from identify.analysis.map_proof import proofs_of
     from twin.importers import import_log, load_mapping
 
     known = load_mapping(mapping)
-    return _logged(import_log(sources, known), known, mapping, out)
+    log = import_log(sources, known)
+    return _logged(log, known, mapping, out, proofs_of(log))
 
 
-def _logged(log: Log, known: ImportMap, mapping: Path, out: Path) -> Said:
-    """Write a log that a map made."""
-    from identify.output.answers.machine import LogAnswer
+def _logged(
+    log: Log, known: ImportMap, mapping: Path, out: Path, proofs: Mapping[str, MapProof]
+) -> Said:
+    """Write a log that a map made. proofs: what it makes of each axis."""
+    from identify.output.answers.machine import ImportAnswer
     from twin.checks import check_assumed
     from twin.importers import told_of
     from twin.importers.guess import doubts_of
@@ -84,7 +89,9 @@ def _logged(log: Log, known: ImportMap, mapping: Path, out: Path) -> Said:
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
     doubts = told_in_log(log)  # for whoever checks it later
     write_log(replace(log, metadata={**log.metadata, **doubts}), out)
-    answer = LogAnswer.of(log=out, samples=len(log), sample_rate=log.sample_rate)
+    answer = ImportAnswer.of(
+        log=out, samples=len(log), sample_rate=log.sample_rate, map=mapping, proofs=proofs
+    )
     told = (*doubts_of(known), *doubts.values())
     warnings = [
         *told_of(log),
@@ -182,7 +189,6 @@ def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: st
 def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> Said:
     """Write a map beside the log that it makes, and say what it makes of each axis."""
     from identify.analysis.map_proof import proofs_of
-    from identify.output.answers.machine import ImportAnswer
     from identify.output.proposal import proof_text
     from twin.errors import at
     from twin.importers import import_log
@@ -193,13 +199,12 @@ def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> 
         known = parse_mapping(text)
     log = import_log(sources, known)
     kept = _kept(mapping, text)
-    done = _logged(log, known, mapping, out)
     proofs = proofs_of(log)
+    done = _logged(log, known, mapping, out, proofs)
     lines = [f"{mapping}: the map, to be used for other recordings of this machine", done.text]
     lines += [proof_text(axis, proof) for axis, proof in proofs.items()]
-    answer = ImportAnswer.of(done.answer, map=mapping, proofs=proofs)
     told = "\n\n".join(filter(None, (shown, "\n".join(lines))))
-    return Said(told, answer, [*kept, *done.warnings])
+    return replace(done, text=told, warnings=[*kept, *done.warnings])
 
 
 def _answers(needs: Sequence[Need]) -> Answers:

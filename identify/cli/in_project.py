@@ -39,7 +39,7 @@ class Run:
         from identify.project.history import note
         from identify.project.keeping import KEPT, keep
 
-        if not fine and self.command not in KEPT:
+        if not fine and (self.command == "import" or self.command not in KEPT):
             return  # nothing was made
         typed = shlex.join(["twin", *self.full])
         keep(self.folder, self.command, given, answer, typed)

@@ -98,6 +98,11 @@ def _imported(folder: Folder, project: Project, given: Given) -> list[str]:
     return [str(path)]
 
 
+def _cut(folder: Folder, project: Project, given: Given) -> list[str]:
+    """The stretch of a recording, beside it."""
+    return [str(folder.free_name("logs", f"{Path(given['log']).stem}-{{}}.mcap"))]
+
+
 def _found(folder: Folder, project: Project, given: Given) -> list[str]:
     """The last diagnosis of the present model, where all that it found is to be added."""
     if not given.get("found"):
@@ -109,6 +114,10 @@ def _found(folder: Folder, project: Project, given: Given) -> list[str]:
             f"{folder.file}: has no diagnosis of its present model; `twin diagnose` makes one"
         )
     return [answer.file]
+
+
+def _named(folder: Folder, project: Project, given: Given) -> list[str]:
+    return [folder.root.resolve().name]
 
 
 def _exported(folder: Folder, project: Project, given: Given) -> list[str]:
@@ -139,7 +148,7 @@ def _rest(inputs: Mapping[str, Source]) -> dict[str, Source]:
 _OF_MODEL = {"model": _model}
 FILLINGS: Mapping[str, Filling] = {
     "import": Filling({}, {"out": _imported}, None),
-    "new": Filling({"logs": _logs("training selection")}, _NEW_MODEL),
+    "new": Filling({"logs": _logs("training selection")}, _NEW_MODEL | {"name": _named}),
     "fit": Filling(_split(_ROLES, _OF_MODEL), _rest(_ROLES) | _NEW_MODEL),
     "diagnose": Filling(
         _split(_ROLES, _OF_MODEL), _rest(_ROLES) | {"html": _free("answers", "{}-diagnose.html")}
@@ -155,7 +164,10 @@ FILLINGS: Mapping[str, Filling] = {
         {"holdout": _ROLES["holdout"], "out": _free("experiments", "{}.toml")},
     ),
     "feedforward": Filling(_split(_TESTS, _OF_MODEL), {"before": _model_before}),
-    "frf": Filling({"logs": _logs("training selection test")}, {}),
+    "frf": Filling(
+        {"logs": _logs("training selection test")}, {"plot": _free("answers", "{}-frf.png")}
+    ),
+    "cut": Filling({}, {"out": _cut}, None),
     "check": Filling(_ALL, {}),
     "info": Filling(_ALL, {}),
     "export": Filling(_OF_MODEL, {"folder": _exported}, "model"),

@@ -23,7 +23,18 @@ from twin.files import write_atomically
 Given = Mapping[str, Any]
 Answer = Mapping[str, Any]
 ROLE_OF: Mapping[str, RoleName] = {"fit": "training", "holdout": "selection", "test": "test"}
-KEPT = ("diagnose", "compare", "plan", "feedforward", "frf", "check", "add", "fit", "view")
+KEPT = (
+    "import",
+    "diagnose",
+    "compare",
+    "plan",
+    "feedforward",
+    "frf",
+    "check",
+    "add",
+    "fit",
+    "view",
+)
 """Commands whose answers a project keeps."""
 
 
@@ -48,7 +59,7 @@ def _answered(
     folder: Folder, command: str, given: Given, answer: Answer, typed: str
 ) -> Callable[[Project], Project]:
     """Write the answer beside its page."""
-    page = given.get("html")
+    page = given.get("html") or given.get("plot")
     name = Path(page).with_suffix(".json") if page else None
     name = name or folder.free_name("answers", f"{{}}-{command}.json")
     write_atomically(folder.root / name, json.dumps(answer).encode())
@@ -81,6 +92,19 @@ def _import(given: Given, answer: Answer) -> Callable[[Project], Project] | None
         if not old:
             return _more(project, "recordings", entry)
         changed = [entry if r is old[0] else r for r in project.recordings]
+        return project.model_copy(update={"recordings": changed})
+
+    return change
+
+
+def _cut(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    """The stretch takes the place of the recording that it was cut from."""
+
+    def change(project: Project) -> Project:
+        changed = [
+            r.model_copy(update={"file": answer["log"]}) if r.file == str(given["log"]) else r
+            for r in project.recordings
+        ]
         return project.model_copy(update={"recordings": changed})
 
     return change
@@ -149,4 +173,5 @@ def _export(given: Given, answer: Answer) -> Callable[[Project], Project]:
 
 _ADDING: Mapping[str, Adding] = {
     "import": _import, "new": _new, "fit": _fit, "add": _add, "plan": _plan, "export": _export,
+    "cut": _cut,
 }  # fmt: skip

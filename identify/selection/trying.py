@@ -18,6 +18,7 @@ from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
+from identify.selection.ahead import Ahead
 from identify.selection.candidates import Candidate, candidate_of, noise_candidate
 from identify.selection.changes import (
     Added,
@@ -86,9 +87,12 @@ def tried_beside(
         changes = []
     controls = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")
-    screenings = spread(lambda c: c.screen(judged, controls), changes, trying)
+    ahead = Ahead(progress)
+    screenings = spread(lambda c: ahead.screened(c.screen(judged, controls)), changes, trying)
     looks = judged.dataset.looks
     tried = _refitted(judged, screenings, looks * len({e.kind for e in effects}), progress)
+    for one in tried:
+        ahead.note(one.change, one.candidate.part)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
     if not enough:
         progress("trying free curves", 0, 1)

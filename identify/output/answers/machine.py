@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import field_validator
 
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, read
 
@@ -169,7 +171,7 @@ def _axis_info(axis: AxisInfo) -> AxisInfoEntry:
 
 
 class LogAnswer(Answer):
-    """What `twin simulate` and `twin import` print of the log that they wrote."""
+    """What `twin simulate` and `twin cut` print of the log that they wrote."""
 
     log: File
     samples: int
@@ -220,6 +222,16 @@ class ProposedColumn(Entry):
     field: str | None
     certainty: Literal["sure", "likely", "unsure"] | None
     why: str
+    course: list[Number]
+    """Means of at most 80 parts of it, in their order: what it looks like."""
+
+    @field_validator("course", mode="before")
+    @classmethod
+    def _in_short(cls, value: Any) -> list[float]:
+        import numpy as np
+
+        parts = np.array_split(np.asarray(value, dtype=float), min(80, len(value)))
+        return [float(part.mean()) for part in parts]
 
 
 class MapAnswer(Answer):
@@ -237,10 +249,12 @@ class MapProofEntry(Entry):
     explained_reversed: Number = read("motion.backward")
     both_ways: bool = read("motion.both_ways")
     """Whether the axis moves both ways, without which no sign is told."""
+    mass: Number
+    mass_unit: str = read("units.mass")
 
 
 class ImportAnswer(LogAnswer):
-    """What `twin import` prints of a log by a map that it proposed and wrote beside it."""
+    """What `twin import` prints of a log, with what its map makes of each axis."""
 
     map: File
     proofs: dict[str, MapProofEntry]

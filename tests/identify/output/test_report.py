@@ -19,6 +19,7 @@ from built_fits import axis_of, built, built_fit, fitted
 from report_cases import Case, Outline
 
 from identify import workflow
+from identify.dataset.dataset import Role
 from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.estimation.fit import Outcome, finished
@@ -279,6 +280,10 @@ def test_the_selection_error_is_one_number(case: Case) -> None:
     assert case.x.dataset.channel_delay > 0.0
     assert case.x.chosen.before == pytest.approx(finding.tested.before)
     assert case.x.chosen.before == pytest.approx(cogging.gain.before, rel=1e-3)
+    (step,) = case.addition.model.history
+    assert errors_of_step(step)[Role.SELECTION] == pytest.approx(
+        (case.x.chosen.before, case.x.chosen.after), rel=1e-2
+    )
 
 
 def test_no_error_of_the_growth_is_below_the_floor_of_its_logs(case: Case) -> None:

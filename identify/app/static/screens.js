@@ -1,0 +1,291 @@
+// The screens, left to right as the work goes.
+import { get, run } from "./app.js";
+import { bar, frames, h, last, percent, put, region } from "./build.js";
+import { recordings } from "./recordings.js";
+
+const known = {};  // answers by file, which never change
+
+/** An answer of the project; redrawn when it has come. */
+function answer(file, then) {
+  if (!file) return null;
+  if (!(file in known)) {
+    known[file] = null;
+    get(`/api/answer?file=${encodeURIComponent(file)}`).then(a => { known[file] = a; then(); }).catch(() => {});
+  }
+  return known[file];
+}
+
+let catalogue = null;
+function effects(then) {
+  if (catalogue === null) {
+    catalogue = [];
+    get("/api/effects").then(a => { catalogue = a.effects; then(); }).catch(() => { catalogue = null; });
+  }
+  return catalogue;
+}
+
+/** Whether a command of this kind runs or waits. */
+const busy = (state, kind) => state.jobs.some(j => ["running", "waiting"].includes(j.state) && j.words[0] === kind);
+
+function button(text, kind, words, state, lead = false) {
+  return h("button", { id: `do-${words.join("-").replace(/\W/g, "-")}`, class: lead ? "main" : "",
+    disabled: busy(state, kind), onclick: () => run(...words) }, busy(state, kind) ? "Runs ..." : text);
+}
+
+const ofExperiment = answer => answer.command.startsWith("twin view experiments/");
+const needsModel = () => h("p", {}, "There is no model yet. ", h("a", { href: "#model" }, "Propose a first model"), ".");
+const jobsOf = (state, kind) => state.jobs.filter(j => j.words[0] === kind).map(j => [j.number, j.state]);
+
+// --- Model -------------------------------------------------------------------------------------------
+const model = {
+  id: "model", name: "Model", values: {}, filter: "",
+  build(section) {
+    section.append(h("h2", {}, "Model"));
+    this.top = region(section);
+    this.view = region(section);
+    this.cards = region(section);
+    this.gallery = region(section);
+  },
+  update(state) {
+    const file = state.models.at(-1)?.file;
+    put(this.top, [file, state.recordings.length, state.mechanisms, jobsOf(state, "new"), jobsOf(state, "view"),
+      jobsOf(state, "fit")], () => file ? [
+      h("div", { class: "row" }, h("b", {}, file), button("Fit its values", "fit", ["fit"], state),
+        button("Show it move in 3D", "view", ["view"], state),
+        h("a", { href: "#diagnose" }, "Diagnose: what does it lack?")),
+    ] : this.first(state));
+    if (file && !this.values[file]) {
+      get(`/api/model?file=${encodeURIComponent(file)}`).then(m => { this.values[file] = m; this.update(state); }).catch(() => {});
+    }
+    put(this.cards, [this.values[file] ?? null], () => this.values[file] ? cardsOf(this.values[file]) : []);
+    frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
+    const listed = file ? effects(() => this.update(state)) : [];
+    put(this.gallery, [file, listed.length, this.filter, jobsOf(state, "add")], () => listed.length ? galleryOf(this, state, listed) : []);
+  },
+  first(state) {
+    if (!state.recordings.length) return [h("p", {}, "There is no recording yet. ", h("a", { href: "#recordings" }, "Take recordings in"), ".")];
+    const mjcf = h("select", { id: "mjcf", "aria-label": "Mechanism" }, h("option", { value: "" }, "axes of their own"),
+      ...state.mechanisms.map(m => h("option", { value: m }, m)));
+    const mass = h("input", { id: "mass", size: 8, placeholder: "from the logs" });
+    return [
+      h("p", {}, "The first model has mass, friction and a constant force, read off the recordings. What it lacks is what the diagnosis then finds."),
+      h("div", { class: "row" }, h("label", {}, "Mechanism", mjcf),
+        h("label", {}, "Moved mass where it is known, kg or x=2.5", mass)),
+      h("button", { id: "new", class: "main", disabled: busy(state, "new"), onclick: () => run("new",
+        ...(mjcf.value ? ["--mjcf", mjcf.value] : []), ...(mass.value.trim() ? ["--mass", mass.value.trim()] : [])) },
+      "Propose a first model"),
+      state.mechanisms.length ? null : h("p", { class: "soft" }, "Of an arm: drop its MJCF or URDF file (.xml, .urdf) among the recordings; its joints are then the axes."),
+    ];
+  },
+};
+
+function cardsOf(found) {
+  return Object.entries(found.axes).flatMap(([axis, table]) => [h("h3", {}, `Axis ${axis}`), h("div", { class: "cards" },
+    card("Axis", table.values, null), ...table.effects.map(e => card(e.name, e.values, e.fixed)))]);
+}
+
+function card(name, values, fixed) {
+  return h("div", { class: "card" }, h("h3", {}, name), h("table", {}, h("tbody", {}, ...values.map(v => h("tr", {},
+    h("td", { title: v.meaning }, fixed === null ? v.name.replaceAll("_", " ") : v.meaning || v.name), h("td", {}, h("b", {}, v.shown),
+      v.band ? h("div", { class: "soft" }, `90 %: ${v.band[0]} to ${v.band[1]}`) : null,
+      fixed?.includes(v.name) ? h("div", { class: "soft" }, "held") : null))))));
+}
+
+function galleryOf(screen, state, listed) {
+  const wanted = screen.filter.toLowerCase();
+  const fitting = listed.filter(e => `${e.name} ${e.summary}`.toLowerCase().includes(wanted));
+  return [h("details", { open: screen.open, ontoggle: event => { screen.open = event.target.open; } },
+    h("summary", {}, `Add an effect by hand (${listed.length} in the catalogue)`),
+    h("div", { class: "row" }, h("label", {}, "Search", h("input", { id: "filter", value: screen.filter, type: "search",
+      oninput: event => { screen.filter = event.target.value; screen.update(state); } }))),
+    h("div", { class: "cards" }, ...fitting.map(e => h("div", { class: "card" }, h("h3", {}, e.name), h("p", {}, e.summary),
+      h("p", { class: "soft" }, e.equation), h("p", { class: "soft" }, `Seen by: ${e.excited_by}`),
+      h("button", { disabled: busy(state, "add"), "aria-label": `Add ${e.name}`, onclick: () => run("add", e.name) }, "Add")))))];
+}
+
+// --- Compare -----------------------------------------------------------------------------------------
+const compare = {
+  id: "compare", name: "Compare",
+  build(section) {
+    section.append(h("h2", {}, "Compare model and machine"));
+    this.top = region(section);
+    this.page = region(section);
+  },
+  update(state) {
+    put(this.top, [state.models.length, jobsOf(state, "compare")], () => state.models.length ? [
+      h("p", {}, "Where the force of the model differs from that of the machine, on the test logs: by time, position, speed and direction."),
+      button("Compare the present model", "compare", ["compare"], state, true)] : [needsModel()]);
+    frames(this.page, last(state, "compare")?.page, "Comparison of model and machine");
+  },
+};
+
+// --- Diagnose ----------------------------------------------------------------------------------------
+const STATES = { confirmed: "proved", tied: "tied with another", conditional: "proved with others" };
+const diagnose = {
+  id: "diagnose", name: "Diagnose", asked: "",
+  build(section) {
+    section.append(h("h2", {}, "Diagnose: what does the model lack?"));
+    this.top = region(section);
+    this.live = region(section);
+    this.answer = region(section);
+    this.why = region(section);
+    this.page = region(section);
+  },
+  update(state) {
+    const job = state.jobs.find(j => j.words[0] === "diagnose" && j.state === "running");
+    put(this.top, [state.models.length, jobsOf(state, "diagnose")], () => state.models.length ? [
+      button("Find what is missing", "diagnose", ["diagnose"], state, true)] : [needsModel()]);
+    put(this.live, job?.progress ?? null, () => job ? liveOf(job.progress ?? "begins") : []);
+    const entry = last(state, "diagnose"), found = answer(entry?.file, () => this.update(state));
+    const old = entry ? null : state.answers.filter(a => a.command.split(" ")[1] === "diagnose").at(-1);
+    put(this.answer, [found ? entry.file : null, old?.file, jobsOf(state, "add")], () => found ? answerOf(found, state) :
+      old ? [h("p", { class: "soft" }, `${state.models.at(-1)?.file} was not diagnosed yet; the page below is about ${old.model}.`)] : []);
+    const listed = found ? effects(() => this.update(state)) : [];
+    put(this.why, [found ? entry.file : null, listed.length, this.asked, jobsOf(state, "add")], () => listed.length ? whyOf(this, state, found, listed) : []);
+    frames(this.page, (entry ?? old)?.page, "The diagnosis with its evidence");
+  },
+};
+
+function liveOf(progress) {
+  const [where, ahead] = progress.split("; ahead: ");
+  const leading = (ahead ?? "").replace(/ \(.*$/, "").split(", ").map(t => /^(.*) (\d+) %$/.exec(t)).filter(Boolean);
+  return [h("div", { class: "card lead", "aria-live": "polite" }, h("p", {}, where), leading.length ?
+    h("h3", {}, "Likely so far, by what each alone would explain") : null,
+  ...leading.map(([, name, share]) => bar(name, share / 100)))];
+}
+
+function axesOf(found) {
+  const axes = Object.values(found.axes ?? {});
+  return axes.length ? axes : [found];
+}
+
+function answerOf(found, state) {
+  const axes = axesOf(found);
+  const all = axes.flatMap(a => a.findings.filter(f => f.kind === "missing"));
+  return [...axes.map(a => h("div", { class: "card lead" }, h("h3", {}, `Axis ${a.axis}: ${a.explanation}`),
+    h("div", { class: "cards" }, ...a.findings.map(f => findingOf(f, a.axis, state)))),
+  ), all.length ? button(all.length > 1 ? `Add all ${all.length}` : `Add ${all[0].effect}`, "add", ["add", "--found"], state, true) : null, all.length > 1 ? h("span", { class: "soft" }, " fits all of them together") : null];
+}
+
+function findingOf(f, axis, state) {
+  const parts = [h("h3", {}, f.effect ?? f.kind), h("p", {}, STATES[f.state] ?? f.state ?? "",
+    f.confidence ? `; ${percent(f.confidence)} of such answers were right` : "")];
+  if (f.explains !== null) parts.push(bar("explains of the error", f.explains));
+  if (f.control !== null && f.control !== undefined) parts.push(bar("shifted, which is not real", f.control));
+  if (f.indistinguishable_from?.length) parts.push(h("p", { class: "warn-text" }, `The logs cannot tell it from ${f.indistinguishable_from.join(", ")}.`));
+  if (f.effect && f.kind === "missing") parts.push(h("button", { disabled: busy(state, "add"), "aria-label": `Add ${f.effect}`,
+    onclick: () => run("add", f.effect, "--axis", axis) }, "Add this one"));
+  return h("div", { class: "card" }, ...parts);
+}
+
+function whyOf(screen, state, found, listed) {
+  const chosen = screen.asked;
+  const names = listed.map(e => e.name);
+  const select = h("select", { id: "why", onchange: event => { screen.asked = event.target.value; screen.update(state); } },
+    h("option", { value: "" }, "choose an effect"), ...names.map(n => h("option", { value: n, selected: n === chosen }, n)));
+  const told = chosen ? axesOf(found).map(a => h("div", { class: "card" }, h("h3", {}, `${chosen} on axis ${a.axis}`),
+    ...reasonsOf(a, chosen, listed.find(e => e.name === chosen)),
+    h("button", { disabled: busy(state, "add"), onclick: () => run("add", chosen, "--axis", a.axis) }, "Try it: fit the model with it"))) : [];
+  return [h("div", { class: "row" }, h("label", {}, "Why not", select)), ...told];
+}
+
+function reasonsOf(axis, name, effect) {
+  const tried = axis.ranking.find(c => c.effect === name), skipped = axis.not_tried.find(n => (n.effect ?? n) === name);
+  if (axis.findings.some(f => f.effect === name)) return [h("p", {}, "It is part of the answer.")];
+  if (tried) return [
+    bar("takes of what was left", tried.part ?? 0),
+    h("p", {}, tried.why_not ?? (tried.supported ? "The logs support it beside the model as it was; another explains more." : "The logs do not support it.")),
+    tried.holdout_error_after === null ? null : h("p", { class: "soft" },
+      `selection error ${short(tried.holdout_error_before)} -> ${short(tried.holdout_error_after)} ${tried.unit}`),
+    h("p", { class: "soft" }, `What would show it: ${effect.excited_by}`)];
+  return [h("p", {}, skipped?.why ?? skipped?.reason ?? "It is in the model already, or the axis cannot have it."),
+    h("p", { class: "soft" }, `What would show it: ${effect.excited_by}`)];
+}
+
+const short = value => value === null ? "" : Number(value).toPrecision(3);
+
+// --- Experiment --------------------------------------------------------------------------------------
+const experiment = {
+  id: "experiment", name: "Experiment",
+  build(section) {
+    section.append(h("h2", {}, "The next experiment"));
+    this.top = region(section);
+    this.answer = region(section);
+    this.made = region(section);
+    this.view = region(section);
+  },
+  update(state) {
+    put(this.top, [state.models.length, jobsOf(state, "plan")], () => state.models.length ? [
+      h("p", {}, "The motion that decides best between what the recordings cannot tell apart."),
+      button("Plan it", "plan", ["plan"], state, true)] : [needsModel()]);
+    const entry = last(state, "plan"), found = answer(entry?.file, () => this.update(state));
+    put(this.answer, [found ? entry.file : null], () => found ? planOf(found) : []);
+    const file = state.experiments.at(-1)?.file;
+    put(this.made, [file, jobsOf(state, "simulate"), state.runs], () => file ? experimentOf(file, state) : []);
+    frames(this.view, state.answers.filter(ofExperiment).at(-1)?.page, "The experiment on the twin");
+  },
+};
+
+function planOf(found) {
+  return [h("div", { class: `card ${found.decides ? "lead" : "warn"}` },
+    h("h3", {}, found.decides ? found.between.length > 1 ? `Decides between ${found.between.join(" and ")}` : "Shows what the recordings do not" : "No experiment decides"),
+    ...Object.entries(found.excited_by ?? {}).map(([name, why]) => h("p", {}, `${name}: ${why}`)),
+    found.missing_motion ? h("p", {}, found.missing_motion) : null)];
+}
+
+function experimentOf(file, state) {
+  const stem = file.replace(/\.toml$/, "");
+  const formats = [["csv", "CSV"], ["yaml", "ROS 2"], ["st", "TwinCAT"]];
+  return [h("div", { class: "row" }, h("b", {}, file),
+    ...formats.map(([ending, name]) => button(`Write for ${name}`, "simulate", ["simulate", file, "--setpoints", `${stem}-run.${ending}`], state)),
+    button("Run it on the twin", "simulate", ["simulate", file], state)),
+  h("ul", {}, ...state.runs.map(r => h("li", {}, h("a", { href: `/files/${r}?keep=1`, download: "" }, r), " ",
+    r.endsWith(".mcap") ? button("Show in 3D", "view", ["view", r, state.models.at(-1).file, "--html", `answers/${r.split("/").at(-1)}.html`], state) : null)))];
+}
+
+// --- Take along --------------------------------------------------------------------------------------
+const FORMATS = [["c", "C for a controller"], ["csv", "feedforward table, CSV"], ["twincat", "TwinCAT (Structured Text)"], ["ros2_control", "ROS 2 control"],
+  ["fmu", "FMU for Simulink and others"], ["mjcf", "MuJoCo"]];
+const along = {
+  id: "along", name: "Take along",
+  build(section) {
+    section.append(h("h2", {}, "Take along"));
+    this.top = region(section);
+    this.made = region(section);
+    this.worth = region(section);
+  },
+  update(state) {
+    put(this.top, [state.models.at(-1)?.file, jobsOf(state, "export"), jobsOf(state, "feedforward"), jobsOf(state, "frf")], () => state.models.length ? [
+      h("p", {}, `${state.models.at(-1).file} as`),
+      h("div", { class: "row" }, ...FORMATS.map(([key, name]) => button(name, "export", ["export", "--to", key], state))),
+      h("div", { class: "row" }, button("What is it worth as feedforward?", "feedforward", ["feedforward"], state),
+        button("Frequency response of the logs", "frf", ["frf"], state))] : [needsModel()]);
+    put(this.made, [state.exports, state.answers.length], () => [
+      state.exports.length ? h("h3", {}, "Exported") : null,
+      h("ul", {}, ...state.exports.flatMap(e => e.files.map(f => h("li", {}, h("a", { href: `/files/${f}?keep=1`, download: "" }, f))))),
+      h("h3", {}, "Reports, one file each"),
+      h("ul", {}, ...state.answers.filter(a => a.page).map(a => h("li", {}, h("a", { href: `/files/${a.page}?keep=1`, download: "" }, a.page),
+        h("span", { class: "soft" }, ` ${a.model ?? ""}`))))]);
+    const jobs = state.jobs.filter(j => ["feedforward", "frf"].includes(j.words[0]) && j.state === "done");
+    put(this.worth, jobs.map(j => j.number), () => jobs.slice(0, 2).map(j => h("div", { class: "card" }, h("h3", {}, j.command),
+      h("pre", { tabindex: 0 }, [j.text, j.code === 0 ? "" : j.remarks.at(-1)].filter(Boolean).join("\n")))));
+  },
+};
+
+// --- Fleet -------------------------------------------------------------------------------------------
+const fleet = {
+  id: "fleet", name: "Fleet", there: state => state.stores.length > 0,
+  build(section) {
+    section.append(h("h2", {}, "Fleet"));
+    this.top = region(section);
+    this.page = region(section);
+  },
+  update(state) {
+    put(this.top, [state.stores, jobsOf(state, "fleet")], () => state.stores.map(store => h("div", { class: "row" }, h("b", {}, store),
+      button("Which machines changed?", "fleet", ["fleet", "report", "--store", store, "--out", `answers/${store}-fleet.html`], state, true))));
+    const done = state.jobs.find(j => j.words[0] === "fleet" && j.state === "done" && j.code !== 2);
+    frames(this.page, done ? done.words.at(-1) : null, "The machines and their alarms");
+  },
+};
+
+export const screens = [recordings, model, compare, diagnose, experiment, along, fleet];

@@ -1,0 +1,115 @@
+"""`twin app` walked in a real browser, as an engineer does who has never seen it."""
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from app_runs import browsed, served
+from cli_runs import twin
+
+from identify.project.folder import Folder
+
+
+def recorded(path: Path, rate: float, seed: int, seconds: int = 6) -> Path:
+    """A mass of 5 kg with Coulomb friction and a spring of 40 N/m, at 1 kHz."""
+    noise, t = np.random.default_rng(seed), np.arange(1000 * seconds) / 1000.0
+    x = 0.05 * np.sin(rate * t) + 0.02 * np.sin(2.6 * rate * t)
+    a = -(rate**2) * (0.05 * np.sin(rate * t) + 0.1352 * np.sin(2.6 * rate * t))
+    force = 5.0 * a + 2.1 * np.sign(np.gradient(x)) + 40.0 * x + noise.normal(0.0, 0.05, len(t))
+    columns = np.column_stack([t, 1e3 * x + noise.normal(0.0, 1e-4, len(t)), force])
+    np.savetxt(path, columns, "%.9g", ",", header="time_s,pos_mm,force_N", comments="")
+    return path
+
+
+def test_the_first_screen_by_keyboard_and_a_file_that_is_none(tmp_path):
+    """Hostile names are texts, and what is wrong is one sentence."""
+    hostile = "<img src=x onerror=alert(1)>.csv"
+    broken = tmp_path / hostile
+    broken.write_text("this is\nno recording\n")
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        assert "token" not in page.url
+        page.set_input_files("#files", str(broken))
+        page.wait_for_selector(".card.warn")
+        assert hostile in page.inner_text("main")
+        assert page.query_selector("main img") is None
+        page.focus("nav a >> nth=1")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("text=There is no recording yet")
+        assert page.title().startswith("Model")
+        for field in page.query_selector_all("button, select, input"):
+            assert field.evaluate("e => e.ariaLabel || e.labels?.length || e.textContent.trim()")
+
+
+@pytest.mark.slow  # a diagnosis, twice
+def test_the_walk_from_three_files_to_the_added_effect(tmp_path):
+    files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k)) for k in range(3)]
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", files)
+        page.click("#import-all")
+        page.wait_for_selector("text=force explained to")
+        other = context.new_page()  # a second tab, which only looks
+        other.goto(address)
+        page.click("nav >> text=Model")
+        page.click("#new")
+        page.wait_for_selector("text=Fit its values")
+        page.click("nav >> text=Diagnose")
+        page.click("#do-diagnose")
+        page.wait_for_selector("#stop")
+        page.reload()
+        page.wait_for_selector("#stop, #do-add---found")
+        page.click("#do-add---found")
+        page.wait_for_selector(".ledger li:nth-child(2)")
+        other.wait_for_selector(".ledger li:nth-child(2)")
+        page.click("nav >> text=Take along")
+        page.click("#do-export---to-c")
+        page.wait_for_selector("text=exports/1-c/")
+    project = Folder(folder).read()
+    assert "spring" in project.models[-1].change
+    logs = [r.file for r in project.recordings]
+    answer = next(a.file for a in project.answers if "diagnose" in a.command)
+    words = ["add", answer, "models/1.toml", logs[0], "--holdout", logs[1], "--test", logs[2]]
+    done = twin(*words, "--found", "-o", "models/outside.toml", folder=folder)
+    assert done.returncode == 0
+    own, outside = ((folder / f"models/{n}.toml").read_text() for n in ("2", "outside"))
+    assert own == outside  # to the last digit
+
+
+@pytest.mark.slow  # two servers' worth of commands
+def test_a_killed_worker_and_an_edit_from_outside_are_told_in_the_page(tmp_path):
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k, 60)) for k in range(2)]
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", files)
+        page.click("#import-all")
+        page.wait_for_selector("#check:enabled")
+        page.wait_for_selector("td >> text=run1.csv")
+        assert twin("new", folder=folder).returncode == 0  # the command line beside it
+        page.wait_for_selector("text=models/1.toml")
+        page.click("nav >> text=Diagnose")
+        page.click("#do-diagnose")
+        job = page.wait_for_function(
+            "fetch('/api/state').then(a => a.json()).then(s => s.jobs[0]).then("
+            "j => j.words[0] === 'diagnose' && j.state === 'running' && j.process)"
+        )
+        os.kill(job.json_value(), signal.SIGKILL)
+        page.wait_for_selector("text=was killed; nothing of it is half written")
+        assert not list(folder.rglob("*.twin-part"))
+        page.click("#do-diagnose")
+        page.click("#stop")
+        page.wait_for_selector("text=was stopped; the project is as it was")
+        page.click("#undo")
+        page.wait_for_selector("text=No model yet")
+    assert Folder(folder).read().models == []
