@@ -15,10 +15,9 @@ if TYPE_CHECKING:
     from identify.project.entries import Project, RoleName
     from identify.project.folder import Folder
 
-projects = Commands(
-    help="A folder that holds recordings, models and answers.", rich_markup_mode=None
-)
-app.add_typer(projects, name="project")
+ABOUT = "A folder that holds recordings, models and answers."
+projects = Commands(help=f"{ABOUT}\n\nExample: twin project init servo", rich_markup_mode=None)
+app.add_typer(projects, name="project", short_help=ABOUT)
 
 
 @projects.command()

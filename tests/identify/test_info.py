@@ -115,7 +115,9 @@ def test_faults_are_one_line_and_a_file_that_is_no_log_too(tmp_path) -> None:
 
 ROOT = Path(__file__).parent.parent.parent
 COMMANDS = {n: c for n, c in typer.main.get_command(app).commands.items() if not c.hidden}
-EVERY = COMMANDS | {f"fleet {n}": c for n, c in COMMANDS["fleet"].commands.items()}
+EVERY = COMMANDS | {
+    f"{group} {n}": c for group in ("fleet", "project") for n, c in COMMANDS[group].commands.items()
+}
 
 
 def test_a_whole_installation_is_one_line_each(tmp_path) -> None:
