@@ -25,7 +25,7 @@ from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate
 from identify.selection.nonparametric import fit_nonparametric, physics_alone
 from identify.selection.trying import effect_tried, reshape
-from identify.workflow import Model, as_given, fit, fit_as_given, read_as, recording_of
+from identify.workflow import Model, as_given, fit, fit_as_given
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
@@ -56,12 +56,8 @@ def add(
     effect = load_catalogue()[effect] if isinstance(effect, str) else effect
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
-    model, *parts = as_given(model, logs, holdout, test)
-    recording = recording_of(model, parts[0])
-    training, selection, tests = (read_as(recording, part) for part in parts)
-    before = fit_as_given(
-        model, training, selection, tests, Catalogue([]), test_function, progress, [effect]
-    )
+    read = as_given(model, logs, holdout, test)
+    before = fit_as_given(read, Catalogue([]), test_function, progress, [effect])
     names = [axis] if axis else list(before.fits)
     for name in names:
         model.axis(name)
@@ -82,7 +78,7 @@ def add(
         base = replace(fit_axis(base.axis, there.training), begun=base.begun)
     made = addition(best, base, prepared, before.model, given)
     why = axis_in_words(effect.name, best.axis, names, having)
-    return _with_notes(made, *read_otherwise_in_words(recording), why)
+    return _with_notes(made, *read_otherwise_in_words(read.recording), why)
 
 
 def _attempt(base: Fit, dataset: Dataset, effect: Effect) -> tuple[Candidate, Dataset]:

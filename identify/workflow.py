@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -117,19 +117,14 @@ def fit(
     can be fitted: an axis that comes to rest within every test function, a force that is not a
     number.
     """
-    model, *given = as_given(model, logs, holdout, test, catalogue)
-    recording = recording_of(model, given[0])
-    training, selection, tests = (read_as(recording, part) for part in given)
-    known = Catalogue([]) if catalogue is None else usable(catalogue, model)
-    found = fit_as_given(model, training, selection, tests, known, test_function, progress)
-    return replace(found, recording=recording)
+    given = as_given(model, logs, holdout, test, catalogue)
+    known = Catalogue([]) if catalogue is None else usable(catalogue, given.model)
+    found = fit_as_given(given, known, test_function, progress)
+    return replace(found, recording=given.recording)
 
 
 def fit_as_given(
-    model: MachineModel,
-    logs: Mapping[str, Log],
-    holdout: Mapping[str, Log],
-    test: Mapping[str, Log],
+    logs: Given,
     known: Catalogue,
     test_function: float | None,
     progress: Progress,
@@ -137,7 +132,8 @@ def fit_as_given(
 ) -> FitResult:
     """As ``fit`` says; tried: effects that are to be tried beside those of the model."""
     progress(READING, 0, 1)
-    found, given = datasets(model, logs, holdout, test_function, test), model
+    model = given = logs.model
+    found = datasets(model, logs.training, logs.selection, test_function, logs.test)
     fits, intervals, refits, held, tested = {}, {}, {}, {}, {}
     for i, (axis, dataset) in enumerate([*found.items()]):
         progress("fitting", i, len(found))
@@ -190,18 +186,30 @@ def compare(
 ) -> Comparison:  # fmt: skip
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     progress(READING, 0, 1)
-    model, logs, *_ = as_given(model, logs)
-    recording = recording_of(model, logs)
-    logs = read_as(recording, logs)
+    given = as_given(model, logs)
+    model, axes = given.model, given.model.axes
     found = {
-        axis: telling(dataset, sticks(model.axes[axis]))
-        for axis, dataset in datasets(model, logs, {}, test_function).items()
+        axis: telling(dataset, sticks(axes[axis]))
+        for axis, dataset in datasets(model, given.training, {}, test_function).items()
     }
     for axis, dataset in found.items():
-        require_residual(model.axes[axis], dataset)
-    given = model.axes
-    found = {axis: noise_known(given[axis], aligned(given[axis], d)) for axis, d in found.items()}
-    return replace(_compared(model, found, {}, progress), recording=recording)
+        require_residual(axes[axis], dataset)
+    found = {axis: noise_known(axes[axis], aligned(axes[axis], d)) for axis, d in found.items()}
+    return replace(_compared(model, found, {}, progress), recording=given.recording)
+
+
+@dataclass(frozen=True)
+class Given:
+    """A model, and the logs of each role by name as its file needs them.
+
+    recording: how the logs of a mechanism were another than that; None where they were right.
+    """
+
+    model: MachineModel
+    training: Mapping[str, Log]
+    selection: Mapping[str, Log]
+    test: Mapping[str, Log]
+    recording: Recording | None
 
 
 def as_given(
@@ -210,11 +218,14 @@ def as_given(
     holdout: GivenLogs | None = None,
     test: GivenLogs | None = None,
     catalogue: Catalogue | None = None,
-) -> tuple[MachineModel, Mapping[str, Log], Mapping[str, Log], Mapping[str, Log]]:
-    """A model and the logs of each role by name, of whatever the caller has. Raises InputError."""
+) -> Given:
+    """A model and its logs, of whatever the caller has. Raises InputError."""
     roles = (Role.TRAINING, logs), (Role.SELECTION, holdout), (Role.TEST, test)
-    training, selection, tests = (logs_by_name(given, role.value) for role, given in roles)
-    return as_model(model, catalogue), training, selection, tests
+    parts = [logs_by_name(given, role.value) for role, given in roles]
+    machine = as_model(model, catalogue)
+    recording = _recording_of(machine, parts[0])
+    training, selection, tests = (_read_as(recording, part) for part in parts)
+    return Given(machine, training, selection, tests, recording)
 
 
 def _compared(
@@ -261,12 +272,8 @@ def diagnose(
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
     known = usable(catalogue, model)
-    model, *given = as_given(physics_alone(model), logs, holdout, test)
-    recording = recording_of(model, given[0])
-    training, selection, tests = (read_as(recording, part) for part in given)
-    result = fit_as_given(
-        model, training, selection, tests, Catalogue([]), test_function, progress, [*known.values()]
-    )
+    given = as_given(physics_alone(model), logs, holdout, test)
+    result = fit_as_given(given, Catalogue([]), test_function, progress, [*known.values()])
     away = departures_of(result.model, result.fits, result.datasets, known, progress)
     # Of a mechanism the joints share their bodies, which were found at one length.
     lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
@@ -295,13 +302,13 @@ def diagnose(
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
         bodies=away.bodies,
-        recording=recording,
+        recording=given.recording,
     )
     _ = found.model  # it is complete: to tell it computes nothing
     return found
 
 
-def recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:
+def _recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:
     """How the logs of a mechanism are another than its file needs, by the first of them.
 
     One without a joint of it is refused where its motion is read.
@@ -310,7 +317,7 @@ def recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | No
     return misassigned(model, first) if model.joints and {*model.joints} <= {*first.axes} else None
 
 
-def read_as(recording: Recording | None, logs: Mapping[str, Log]) -> Mapping[str, Log]:
+def _read_as(recording: Recording | None, logs: Mapping[str, Log]) -> Mapping[str, Log]:
     """Logs as they are read right."""
     return {n: recording.read(log) for n, log in logs.items()} if recording else logs
 
@@ -340,10 +347,10 @@ def feedforward(
     In simulation, along the motion of the logs. machine: what is simulated, the model itself where
     None. Raises InputError, and CannotRun where the machine cannot be simulated.
     """
-    model, given, *_ = as_given(model, logs, catalogue=catalogue)
+    read = as_given(model, logs, catalogue=catalogue)
+    model, given = read.model, dict(read.training)  # each is read once
     before = None if before is None else as_model(before, catalogue)
     simulated = model if machine is None else as_model(machine, catalogue)
-    given = dict(given)  # each is read once
     moved = those_told(given, {name: unmoved(model, log) for name, log in given.items()})
     found = tracking(simulated, model, before, moved, progress)
     return Feedforward(model, before, tuple(moved), found)

@@ -173,6 +173,9 @@ def _of_parts(
     return NoiseFloor(float(np.sqrt(power)), float(low), float(high), parts)
 
 
+THROUGHOUT = 0.99  # of the weight of a test function: all of it but for rounding
+
+
 def _of_path(axis: AxisModel, log: PreparedLog) -> float:
     """Mean square, N^2, of what laws with memory make of what the readings tell of their path.
 
@@ -184,7 +187,7 @@ def _of_path(axis: AxisModel, log: PreparedLog) -> float:
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
     if motion.path is None or not own.effects:
         return 0.0
-    rests = log.test_function.mean(motion.path.stands.astype(float)) > 0.99
+    rests = log.test_function.mean(motion.path.stands.astype(float)) > THROUGHOUT
     told = moving([log], sticks(axis)) & ~rests
     table = on_blocks(own)
     coarse = replace(motion, path=motion.path.of_every_second())
