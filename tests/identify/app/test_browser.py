@@ -84,6 +84,16 @@ def test_the_walk_from_three_files_to_the_added_effect(tmp_path):
     assert own == outside  # to the last digit
 
 
+def running(page, command: str) -> int:
+    """The process of a command, as soon as it runs."""
+    asked = "fetch('/api/state').then(a => a.json()).then(s => s.jobs[0])"
+    while True:
+        job = page.evaluate(asked)
+        if job["words"][0] == command and job["state"] == "running" and job["process"]:
+            return job["process"]
+        assert job["words"][0] != command or job["ended"] is None
+
+
 @pytest.mark.slow  # two servers' worth of commands
 def test_a_killed_worker_and_an_edit_from_outside_are_told_in_the_page(tmp_path):
     folder = tmp_path / "machine"
@@ -100,11 +110,7 @@ def test_a_killed_worker_and_an_edit_from_outside_are_told_in_the_page(tmp_path)
         page.wait_for_selector("text=models/1.toml")
         page.click("nav >> text=Diagnose")
         page.click("#do-diagnose")
-        job = page.wait_for_function(
-            "fetch('/api/state').then(a => a.json()).then(s => s.jobs[0]).then("
-            "j => j.words[0] === 'diagnose' && j.state === 'running' && j.process)"
-        )
-        os.kill(job.json_value(), signal.SIGKILL)
+        os.kill(running(page, "diagnose"), signal.SIGKILL)
         page.wait_for_selector("text=was killed; nothing of it is half written")
         assert not list(folder.rglob("*.twin-part"))
         page.click("#do-diagnose")
