@@ -54,14 +54,21 @@ class Folder:
         self._keep(Project())
 
     def change(self, change: Change) -> Project:
-        """Change the project as it is now, whoever else has changed it meanwhile."""
+        """Change the project as it is now, whoever else has changed it meanwhile.
+
+        An answer alone is no step that is taken back: it changes nothing that one goes on with.
+        """
         with self._held("state"):
             now = self.read()
             if self._text() != self._last():
                 self._note(self._text())  # edited by hand
             made = change(now)
-            if made != now:
+            if made.model_copy(update={"answers": now.answers}) != now:
                 self._keep(made)
+            elif made != now:
+                text = made.text().encode()
+                write_atomically(self.file, text)
+                write_atomically(self._states()[-1], text)
             return made
 
     def undo(self) -> Project:

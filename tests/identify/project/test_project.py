@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from cli_runs import twin
 
-from identify.project.entries import ExportEntry, Project
+from identify.project.entries import AnswerEntry, ExportEntry, Project
 from identify.project.folder import Folder
 
 T = np.arange(4000) / 1000.0
@@ -161,6 +161,16 @@ def test_an_edit_by_hand_is_one_step_back(tmp_path):
     folder.change(exported("b"))
     kept = [[e.format for e in folder.undo().exports] for _ in range(3)]
     assert kept == [["mine"], ["a"], []]
+
+
+def test_an_answer_alone_is_no_step_back(tmp_path):
+    folder = Folder(tmp_path)
+    folder.begin()
+    folder.change(exported("a"))
+    entry = AnswerEntry(command="twin check", file="answers/1.json")
+    folder.change(lambda p: p.model_copy(update={"answers": [entry]}))
+    assert folder.read().answers == [entry]
+    assert folder.undo() == Project()
 
 
 def test_a_second_command_waits_and_says_for_whom(tmp_path):
