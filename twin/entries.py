@@ -6,9 +6,8 @@ shows that has the JSON schema.
 
 from __future__ import annotations
 
-import difflib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import reduce
 from operator import getitem
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from twin.errors import InputError, at
+from twin.errors import InputError, at, near
 
 NAME_OF_TABLE = "[key]"  # where the library found fault with the name and not what it names
 
@@ -38,12 +37,6 @@ def read_entries(kind: type[Kind], document: Mapping[str, Any]) -> Kind:
     except ValidationError as errors:
         error = errors.errors(include_url=False, include_context=False)[0]
         raise InputError(_sentence(kind, document, error["type"], error["loc"])) from None
-
-
-def near(key: str, known: Iterable[str], cutoff: float = 0.6) -> str:
-    """A question about the nearest known name, or nothing."""
-    found = difflib.get_close_matches(key, list(known), n=1, cutoff=cutoff)
-    return f"did you mean '{found[0]}'? " if found else ""
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Errors that a user may cause; the command line prints them as a single line."""
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -21,6 +22,12 @@ class CannotRun(InputError):
 
 class Unwritten(InputError):
     """A file that could not be written, though its name and folder were good: a disk is full."""
+
+
+def near(key: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """A question about the nearest known name, or nothing."""
+    found = difflib.get_close_matches(key, list(known), n=1, cutoff=cutoff)
+    return f"did you mean '{found[0]}'? " if found else ""
 
 
 @contextmanager

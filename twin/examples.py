@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from twin.entries import near
-from twin.errors import InputError
+from twin.errors import InputError, near
 from twin.files import make_folder, write_atomically
 
 SECONDS = 10.0  # of each log

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from urllib.parse import urlparse
-from urllib.request import url2pathname
 
 PACKAGE = "proton-twin"
 
@@ -22,6 +19,11 @@ def pip_install(extra: str) -> str:
 
 def _source() -> tuple[bool, Path | None]:
     """Whether it is installed as it lies there, and its folder; None where it is from an index."""
+    # They take a tenth of the start of `twin`, and are asked for by what is missing alone.
+    from importlib.metadata import PackageNotFoundError, distribution
+    from urllib.parse import urlparse
+    from urllib.request import url2pathname
+
     try:
         text = distribution(PACKAGE).read_text("direct_url.json")
     except PackageNotFoundError:

@@ -13,8 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from twin.effect import Effect, load_effect
-from twin.entries import near
-from twin.errors import InputError
+from twin.errors import InputError, near
 
 MOST_OF_ONE = 12  # of one effect on an axis: a motor has more than five unrelated periods
 LONGEST_TRIAL = 30.0  # s for loading, trying and compiling a user's file

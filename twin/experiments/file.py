@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from twin.entries import near, read_toml, shown
-from twin.errors import InputError, at
+from twin.entries import read_toml, shown
+from twin.errors import InputError, at, near
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, kind_of
 from twin.experiments.trajectory import AnySetpoint

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from twin.entries import near
-from twin.errors import CannotRun, InputError
+from twin.errors import CannotRun, InputError, near
 from twin.experiments.experiment import Experiment, OneAxis, machine_limits
 from twin.experiments.kinds import (
     Moves,

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from twin.entries import near
-from twin.errors import InputError
+from twin.errors import InputError, near
 
 if TYPE_CHECKING:
     from twin.logs import Log

@@ -16,8 +16,7 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from twin.entries import near
-from twin.errors import InputError
+from twin.errors import InputError, near
 from twin.files import atomic_writer
 from twin.installed import pip_install
 from twin.logs import Log
