@@ -23,6 +23,7 @@ def recorded(path: Path, rate: float, seed: int, seconds: int = 6) -> Path:
     return path
 
 
+@pytest.mark.slow  # a browser and a server: 9 s
 def test_the_first_screen_by_keyboard_and_a_file_that_is_none(tmp_path):
     """Hostile names are texts, and what is wrong is one sentence."""
     hostile = "<img src=x onerror=alert(1)>.csv"
