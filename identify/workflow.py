@@ -313,8 +313,10 @@ def _recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | N
 
     One without a joint of it is refused where its motion is read.
     """
+    if not model.joints:
+        return None  # without reading a log, which each asking does
     first = next(iter(logs.values()))
-    return misassigned(model, first) if model.joints and {*model.joints} <= {*first.axes} else None
+    return misassigned(model, first) if {*model.joints} <= {*first.axes} else None
 
 
 def _read_as(recording: Recording | None, logs: Mapping[str, Log]) -> Mapping[str, Log]:
