@@ -57,7 +57,7 @@ class Guard:
             answer.headers.update(HEADERS)
             await answer(scope, receive, send)
             return
-        if not self._is_token(*self._told(headers)):
+        if not self._is_token(*self._cookie_tokens(headers)):
             said = "open the address that `twin app` prints, with its token\n"
             await PlainTextResponse(said, 403, HEADERS)(scope, receive, send)
             return
@@ -80,7 +80,7 @@ class Guard:
             return "another site's page may ask nothing of this server"
         return None
 
-    def _told(self, headers: Headers) -> list[str]:
+    def _cookie_tokens(self, headers: Headers) -> list[str]:
         """The token of the cookie."""
         cookies = SimpleCookie()
         cookies.load(headers.get("cookie", ""))

@@ -88,7 +88,7 @@ class Jobs:
     def shown(self) -> list[dict[str, Any]]:
         """The last jobs with what they say, the newest first."""
         last = sorted(self.jobs.values(), key=lambda job: -job.number)[:12]
-        return [self._told(job) for job in last]
+        return [self._entry(job) for job in last]
 
     def wait(self, number: int, seconds: float) -> Job:
         """A job when it has ended, or after so many seconds."""
@@ -102,7 +102,7 @@ class Jobs:
             return (self.place / f"{job.number}{ending}").read_text("utf-8", "replace")
         return ""
 
-    def _told(self, job: Job) -> dict[str, Any]:
+    def _entry(self, job: Job) -> dict[str, Any]:
         lines = self.said(job, ".err").splitlines()
         said = [line.removeprefix("twin: ") for line in lines]
         progress = [line for line in said if line.endswith(PROGRESS)]

@@ -115,13 +115,13 @@ class Server:
         name = request.query_params.get("file", "")
         path = inside(self.folder.root, name)
         stamp = path.stat().st_mtime_ns if path.is_file() else None
-        return JSONResponse(await self._told(stamp, "import", name, "--guess"))
+        return JSONResponse(await self._answer(stamp, "import", name, "--guess"))
 
     async def effects(self, request: Request) -> Response:
         """The catalogue: `twin effects --json`."""
-        return JSONResponse(await self._told(None, "effects"))
+        return JSONResponse(await self._answer(None, "effects"))
 
-    async def _told(self, stamp: object, *words: str) -> Mapping[str, Any]:
+    async def _answer(self, stamp: object, *words: str) -> Mapping[str, Any]:
         """The answer of a command that changes nothing, asked once."""
         known = self.asked.get(words)
         if known is None or known[0] != stamp:

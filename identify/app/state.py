@@ -16,7 +16,7 @@ from identify.app.guard import inside
 from identify.app.jobs import Jobs
 from identify.output.answers import plain
 from identify.output.numbers import quantity
-from identify.output.project import errors_told, model_made
+from identify.output.project import error_in_words, model_made
 from identify.project.entries import Project
 from identify.project.folder import HISTORY, OWN, Folder
 from identify.project.history import commands
@@ -79,7 +79,7 @@ def _ledger(folder: Folder, project: Project, index: int) -> dict[str, Any]:
     """A model in words: what was changed, and its errors by role, the test logs first."""
     model = project.models[index]
     errors = [
-        {**e.model_dump(), "told": errors_told(e), "shown": quantity(e.after, e.unit)}
+        {**e.model_dump(), "told": error_in_words(e), "shown": quantity(e.after, e.unit)}
         for e in reversed(model.errors)
     ]
     return {"file": model.file, "made": model_made(model), "errors": errors}

@@ -67,7 +67,7 @@ def filled(command: Any, ctx: Any, args: Sequence[str]) -> list[str]:
     if rest:
         return [*args]
     held, words = ExitStack(), (command.name, *args)
-    held.enter_context(folder.working(shlex.join(["twin", *words]), _told))
+    held.enter_context(folder.working(shlex.join(["twin", *words]), _say_waiting))
     with held:  # let go where anything goes wrong
         added = filling.of(folder, given)
         if added is None:
@@ -121,6 +121,6 @@ def abandoned() -> None:
         run.held.close()
 
 
-def _told(holder: str) -> None:
+def _say_waiting(holder: str) -> None:
     print(f"twin: waits for the end of `{holder}`, which runs in this project "
           f"(this is process {os.getpid()})", file=sys.stderr, flush=True)  # fmt: skip

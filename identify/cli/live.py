@@ -109,10 +109,10 @@ class _Run:
             behind.take(window)
             if served:
                 served.tell(window)
-            self._told(behind.ended(), served)
-        self._told(behind.rest(), served)
+            self._say_causes(behind.ended(), served)
+        self._say_causes(behind.rest(), served)
 
-    def _told(self, causes: Iterator[LiveCause], served: Served | None) -> None:
+    def _say_causes(self, causes: Iterator[LiveCause], served: Served | None) -> None:
         from identify.output.words.fleet import cause_in_words
 
         for cause in causes:

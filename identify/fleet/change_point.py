@@ -56,7 +56,7 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
     out, begin = list[Change](), 0
     asked, dated = (without_odd(values, dead, n) for n in (0, NEIGHBOURS // 2 + 1))
     limits = limits_at(level, len(values))
-    while (told := _told(asked[begin:], variances[begin:], dead, limits)) >= 0:
+    while (told := _night_of_change(asked[begin:], variances[begin:], dead, limits)) >= 0:
         known = slice(begin, begin + told + 1 + LATER)
         scores = _scores(dated[known], variances[known], dead)
         best = int(np.argmax(scores))
@@ -100,7 +100,7 @@ def limits_at(level: float, count: int) -> Array:
 
 
 @compiled(nogil=True)
-def _told(x, variances, dead, limits):
+def _night_of_change(x, variances, dead, limits):
     """After which night a change is told; -1: none is."""
     sums = np.zeros((6, len(x) + 1))
     jumps = 0.0

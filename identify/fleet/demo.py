@@ -81,7 +81,7 @@ def demo(
     return Demo(
         floor,
         tuple(_planted(p, plan) for p in planted),
-        tuple(t for alarm in floor.alarms for t in _told(alarm, floor.causes.get(alarm, ()))),
+        tuple(t for alarm in floor.alarms for t in _named_by(alarm, floor.causes.get(alarm, ()))),
         page,
     )
 
@@ -91,7 +91,7 @@ def _planted(planted: Planted, plan: Plan) -> Told:
     return Told(planted.name, planted.what, night)
 
 
-def _told(alarm: Alarm, causes: Sequence[str]) -> list[Told]:
+def _named_by(alarm: Alarm, causes: Sequence[str]) -> list[Told]:
     """What an alarm names: the effect of its parameter, or what the diagnosis did."""
     own = alarm.parameter.partition(".")[0]
     made = partial(

@@ -90,7 +90,7 @@ class Recursion:
             self.ways.append(way)
         return max(float(np.median(self.ways)), 1e-12)
 
-    def told(self) -> tuple[LiveParameter, ...]:
+    def parameters(self) -> tuple[LiveParameter, ...]:
         """The parameters now, each with half its 90 % band."""
         size = len(self.where)
         if not size:

@@ -119,7 +119,7 @@ class Watcher:
                     left, some = residual(axis, logs), moving(logs, sticks(axis))
                     some[: round((1.0 - share) * len(left))] = False
                     if some.any():
-                        yield self._told(name, logs, left, some, share)
+                        yield self._axis_in_window(name, logs, left, some, share)
             except InputError:
                 continue
 
@@ -139,7 +139,7 @@ class Watcher:
         )
         return PreparedLog.of(motion, LENGTH)
 
-    def _told(
+    def _axis_in_window(
         self,
         name: str,
         logs: Sequence[PreparedLog],
@@ -157,7 +157,7 @@ class Watcher:
         slow.take(logs, left, some, way)
         log = logs[0]
         time = self.then - log.motion.time[-1] + log.time[some]
-        return LiveAxis(name, axis.units.force, time, left[some], error, usual, slow.told())
+        return LiveAxis(name, axis.units.force, time, left[some], error, usual, slow.parameters())
 
     def _asked(self, axis: str) -> list[LiveAlarm]:
         """The alarm of an axis, where its force error has changed."""

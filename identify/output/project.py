@@ -32,7 +32,7 @@ def _model(project: Project, model: ModelEntry) -> Iterator[str]:
     if model.errors and project.logs("test") and not any(e.role == "test" for e in model.errors):
         yield "  not tested: it has no error on the test logs"
     for axis in dict.fromkeys(e.axis for e in model.errors):
-        told = [errors_told(e) for e in reversed(model.errors) if e.axis == axis]
+        told = [error_in_words(e) for e in reversed(model.errors) if e.axis == axis]
         yield f"  axis {axis}: {', '.join(told)}"
 
 
@@ -46,7 +46,7 @@ def model_made(model: ModelEntry) -> str:
     return f"{model.base} + {' + '.join(model.change)}{proof}"
 
 
-def errors_told(error: ErrorsEntry) -> str:
+def error_in_words(error: ErrorsEntry) -> str:
     """The error in a role, with that before the change."""
     if error.before is None:
         return f"{error.role} {quantity(error.after, error.unit)}"

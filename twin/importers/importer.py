@@ -235,8 +235,8 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
         _common_length({**columns, mapping.time.name: times})
         facts |= _start(table, raw, times)
         if (order := order_of(times)) is not None:
-            first = int(np.argmax(np.diff(times) < 0.0)) + 2
-            out = np.count_nonzero(np.diff(times) < 0.0)
+            back = np.flatnonzero(np.diff(times) < 0.0)
+            first, out = back[0] + 2, len(back)
             times, columns = times[order], {n: c[order] for n, c in columns.items()}
             said.append(f"rows out of order in {out} places, the first row {first}; put in order")
         if holes:
