@@ -31,7 +31,7 @@ check: $(VENV)/tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/repo-review --show err .
-	$(BIN)/mypy
+	$(BIN)/pyrefly check --min-severity error
 	$(BIN)/python -m pytest -m "not slow" --changed --seconds 15
 
 bench: $(VENV)/benchmarks
@@ -83,5 +83,5 @@ $(VENV)/docs: $(VENV)/runtime
 	@touch $@
 
 clean:
-	rm -rf $(VENV) docs/_build docs/_generated docs/gallery/effects demo thesis build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) docs/_build docs/_generated docs/gallery/effects demo thesis build dist .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -73,14 +73,13 @@ def _change(
     what: str, arm: Arm, changed: Changed, rng: np.random.Generator
 ) -> tuple[Changed, tuple[Told, ...]]:
     """One thing more that is changed of an arm, and the answers that are right of it."""
-    n, own = len(arm.mass), changed.__dict__
-    i = int(rng.integers(n))
+    i = int(rng.integers(len(arm.mass)))
     joint, link = arm.joints[i], arm.links[i]
     if what == "payload":
         more = float(arm.mass[-1] * rng.uniform(0.2, 0.6))
-        return Changed(**{**own, what: more}), ((BODY, arm.links[-1]),)
+        return replace(changed, payload=more), ((BODY, arm.links[-1]),)
     if what == "weightless":
-        return Changed(**{**own, what: True}), ((RECORDED, "weight"),)
+        return replace(changed, weightless=True), ((RECORDED, "weight"),)
     level = float(arm.coulomb[i])
     size, told = {
         "mass": (float(arm.mass[i] * rng.uniform(0.2, 0.4)), ((BODY, link),)),
@@ -93,7 +92,8 @@ def _change(
     }[what]  # fmt: skip
     if what in ("mass", "rotor") and i == 0:  # about one axis they are one
         told = ((BODY, link), (ROTOR, joint))
-    return Changed(**{**own, what: {i: size}}), told
+    by_joint: dict[str, Any] = {what: {i: size}}
+    return replace(changed, **by_joint), told
 
 
 def _carried(arm: Arm, joint: int) -> float:
@@ -177,7 +177,7 @@ def rows(seed: int, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
     for number in numbers:
         own = machine(seed, number)
         try:
-            row = judged(own)
+            row: dict[str, Any] = judged(own)
         except Exception as error:  # the other machines are to be judged all the same
             print(f"{own.case}: FAILED: {type(error).__name__}: {error}", flush=True)
             row = {"case": own.case, "named": [False] * len(own.right), "wrong": [], "told": [],

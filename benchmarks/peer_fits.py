@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -49,7 +50,7 @@ class Peer:
     """mujoco.sysid with some options of its ``optimize``."""
 
     name: str
-    options: Mapping[str, str]
+    options: Mapping[str, Any]
 
 
 DEFAULT = Peer("mujoco.sysid", {})

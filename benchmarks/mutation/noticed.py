@@ -28,7 +28,7 @@ ALL = Target(low=0.8)
 FOLDER = Target(low=0.6)
 BUDGET = 40.0  # s of tests that are run for a fault
 HANGS = 6.0  # times the budget after which the tests count as hanging, and the fault as noticed
-LEFT_OUT = shutil.ignore_patterns(".git", ".venv", ".mypy_cache", ".ruff_cache", "*.mcap")
+LEFT_OUT = shutil.ignore_patterns(".git", ".venv", ".ruff_cache", "*.mcap")
 
 
 @dataclass(frozen=True)

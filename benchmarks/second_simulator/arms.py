@@ -10,7 +10,7 @@ there as well. A computed-torque loop follows sums of sines.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -121,13 +121,11 @@ def drawn(rng: np.random.Generator, joints: int, rate: int) -> Arm:
     )  # fmt: skip
     own = inertia(bare)
     weight = 9.81 * size * np.cumsum(mass[::-1])[::-1]
-    return Arm(
-        **{
-            **bare.__dict__,
-            "armature": own * rng.uniform(0.15, 0.6, joints),
-            "coulomb": weight * rng.uniform(0.02, 0.08, joints),
-            "viscous": weight * rng.uniform(0.01, 0.05, joints),
-        }
+    return replace(
+        bare,
+        armature=own * rng.uniform(0.15, 0.6, joints),
+        coulomb=weight * rng.uniform(0.02, 0.08, joints),
+        viscous=weight * rng.uniform(0.01, 0.05, joints),
     )
 
 
@@ -186,7 +184,7 @@ def log_of(arm: Arm, changed: Changed, seed: int, duration: float = DURATION) ->
     own = inertia(arm) + arm.armature
     pull, hold = own * BANDWIDTH**2, 2.0 * own * BANDWIDTH
     every = round(1.0 / (STEP * arm.rate))
-    time = np.asarray(STEP * np.arange(round(duration / STEP)))
+    time = STEP * np.arange(round(duration / STEP), dtype=float)
     wanted, speed = _sines(rng, arm.reach, time)
     position, torque = np.empty((2, len(wanted) // every, n))
     bent, command, load = np.zeros(n), np.zeros(n), np.zeros(n)

@@ -87,7 +87,7 @@ class Gains(NamedTuple):
 
 
 # Only `_simulated` is called from Python: wrappers of the parts would take half of the compilation.
-part = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+part = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyrefly: ignore[no-matching-overload]
 
 
 @part

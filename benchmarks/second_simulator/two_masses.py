@@ -68,9 +68,9 @@ class TwoMasses:
 
     def controller(self, frequency: Array) -> Complex:
         """Force over error (k,) N/m: a gain, and the rate of the reading."""
-        late = np.exp(-2j * np.pi * frequency * self.period)
+        late: Complex = np.exp(-2j * np.pi * frequency * self.period)
         stiff, rate = self._gains
-        return np.asarray(stiff + rate * (1.0 - late) / self.period)
+        return stiff + rate * (1.0 - late) / self.period
 
     @property
     def _gains(self) -> tuple[float, float]:

@@ -107,7 +107,7 @@ def _place(motions: Sequence[Motion]) -> tuple[float, bool]:
     """The middle of the positions, m, and whether the axis turns."""
     position = np.concatenate([m.position for m in motions])
     turns = 1.0  # rad, from which gravity is a sine of the angle, and no spring
-    return float(position.mean()), motions[0].units.rotary and np.ptp(position) > turns
+    return float(position.mean()), motions[0].units.rotary and bool(np.ptp(position) > turns)
 
 
 def _of_place(position: Array, place: tuple[float, bool]) -> Array:

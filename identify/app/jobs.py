@@ -171,6 +171,7 @@ class Jobs:
     def _read(path: Path) -> Job | None:
         try:
             values = json.loads(path.read_text(encoding="utf-8"))
-            return Job(**{**values, "words": tuple(values["words"])})
+            values["words"] = tuple(values["words"])
+            return Job(**values)
         except (OSError, ValueError, TypeError, KeyError):
             return None

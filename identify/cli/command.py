@@ -105,7 +105,7 @@ class Commands(typer.Typer):
             run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
             run.__annotations__[AS_JSON.name] = AS_JSON.annotation
             first = (job.__doc__ or "").split("\n\n")[0]
-            known = {"short_help": " ".join(first.split()), **options}
+            known: dict[str, Any] = {"short_help": " ".join(first.split()), **options}
             super(Commands, self).command(name, cls=Command, **known)(run)
             return job
 

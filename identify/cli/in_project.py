@@ -82,7 +82,7 @@ def _with(
     added: Mapping[str, Sequence[str]],
 ) -> list[str]:  # fmt: skip
     """The words of a command with what is added: positional ones behind those that were typed."""
-    options = {p.name: max(p.opts, key=len) for p in command.params}
+    options: dict[str, str] = {p.name: max(p.opts, key=len) for p in command.params}
     positional = [v for name in filling.inputs for v in added.get(name, [])]
     named = [w for n in filling.options for v in added.get(n, []) for w in (options[n], v)]
     typed = [v for n, v in given.items() if not options[n].startswith("-")]

@@ -95,7 +95,7 @@ def _passed(readings: Array, step: float) -> tuple[Array, Array]:
     about one time, the mean.
     """
     at = np.flatnonzero(np.abs(np.diff(readings)) > 0.5 * step)
-    times: Array = np.asarray(at + 0.5)
+    times: Array = np.asarray(at + 0.5, float)
     middle: Array = 0.5 * (readings[at] + readings[at + 1])
     apart, back = np.diff(times), np.abs(np.diff(middle)) < 0.5 * step
     on = np.concatenate([[-1], np.flatnonzero(~back), [-1]])  # the last of a list where none is
@@ -180,7 +180,9 @@ def _waves(readings: Array, period: float) -> Array:
 
 
 def _gains(columns: Array, wanted: Array) -> Array:
-    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ wanted, rcond=1e-9)[0])
+    return np.asarray(
+        np.linalg.lstsq(columns.T @ columns, columns.T @ wanted, rcond=1e-9)[0], float
+    )
 
 
 def _at_every_speed(readings: Array, bend: Array, made: Array, noise: float) -> bool:

@@ -70,7 +70,8 @@ def median_spectrum(
     power = densities(pieces - (pieces.mean(axis=1, keepdims=True) + slope[:, None] * ramp), dt)
     odd = np.arange(2, (len(pieces) - 1) // 2 * 2 + 1, 2)
     bias = 1.0 + np.sum(1.0 / (odd + 1.0) - 1.0 / odd)
-    return np.asarray(np.fft.rfftfreq(segment, dt)), np.asarray(np.median(power, axis=0) / bias)
+    frequency = np.asarray(np.fft.rfftfreq(segment, dt), float)
+    return frequency, np.asarray(np.median(power, axis=0) / bias)
 
 
 def fitted_levels(shapes: Array, power: Array) -> Array:
@@ -420,4 +421,4 @@ def _spread(place: Array, values: Array, cells: int) -> Array:
         ]
     )
     about = (first + np.arange(-1, 3)[:, None]) % cells
-    return np.asarray(np.bincount(about.ravel(), (weights * values).ravel(), cells))
+    return np.asarray(np.bincount(about.ravel(), (weights * values).ravel(), cells), float)

@@ -215,7 +215,7 @@ def _step(columns: Array, force: Array) -> Array:
     """The strengths (k,) of unit columns that explain a force (n,) N, with a weak penalty."""
     weak = RIDGE * np.eye(columns.shape[1])
     rows = np.concatenate([columns, weak])
-    return np.asarray(np.linalg.lstsq(rows, np.pad(force, (0, len(weak))), rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(rows, np.pad(force, (0, len(weak))), rcond=None)[0], float)
 
 
 def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:

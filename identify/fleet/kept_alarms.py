@@ -71,4 +71,5 @@ def _row(alarm: Alarm) -> Mapping[str, Any]:
 
 def _read(row: Mapping[str, Any]) -> Alarm:
     others = tuple(row["others"].split(", ")) if row["others"] else ()
-    return Alarm(**{**row, "scope": Scope(row["scope"]), "others": others})
+    values: dict[str, Any] = {**row, "scope": Scope(row["scope"]), "others": others}
+    return Alarm(**values)

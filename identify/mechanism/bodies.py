@@ -155,7 +155,7 @@ class Body:
             apart = Joints(tuple(r[::every] for r in bodies.readings), every * period)
             count = len(apart.readings[0]) - 1
             told = self.mechanism.per_unit(self.index, *apart.along(slice(0, count)))
-            times = np.asarray(every * (np.arange(count) + 0.5) - 0.5)
+            times = every * (np.arange(count, dtype=float) + 0.5) - 0.5
             self._known[key] = times, told[:, :, self.mechanism.moved_by(self.index)]
         return self._known[key]
 

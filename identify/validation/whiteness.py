@@ -150,8 +150,8 @@ def correlation(
     sure = 0.99  # part of white residuals whose every correlation is within the wider limit
     return Correlation(
         signal=signal,
-        lag=np.asarray(spacing * lags),
-        value=products / max(power, 1e-300),
+        lag=np.asarray(spacing * lags, float),
+        value=np.asarray(products / max(power, 1e-300)),
         tested=tested,
         bound=float(NORMAL.inv_cdf(0.5 + WITHIN / 2.0) / root),
         limit=float(NORMAL.inv_cdf(1.0 - (1.0 - sure) / 2.0 / count) / root),

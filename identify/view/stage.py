@@ -60,14 +60,14 @@ class Stage:
     def pose(self, replay: Replay, frame: int, gain: float) -> None:
         """Stand as in a frame, with the differences to the measured machine enlarged."""
         shown = (self.data, self.ghost, self.aim)
-        places = {}
+        places: dict[str, Array] = {}
         for axis, own in replay.axes.items():
             measured = own.measured[frame]
             off = np.array([0.0, own.modelled[frame] - measured, own.setpoint[frame] - measured])
             # Nothing is drawn where nothing is known: see ``drawn``.
             places[axis] = measured + gain * np.nan_to_num(off)
         for joint, (ratios, begin) in self.moves.items():
-            at = begin + sum(ratio * places[axis] for axis, ratio in ratios.items())
+            at = begin + np.sum([ratio * places[axis] for axis, ratio in ratios.items()], axis=0)
             for data, position in zip(shown, at, strict=True):
                 data.qpos[self.model.jnt_qposadr[joint]] = position
         for data in shown:

@@ -48,7 +48,8 @@ class Found(NamedTuple):
 class Chapter(Protocol):
     """A module that is a chapter: the title of its section, and a run, in small or whole."""
 
-    TITLE: str
+    @property
+    def TITLE(self) -> str: ...
 
     def run(self, small: bool, rng: np.random.Generator) -> Found: ...
 

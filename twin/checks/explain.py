@@ -82,7 +82,7 @@ class Smoother:
 
     def time(self, index: NDArray[np.intp]) -> Array:
         """Times (k,) in s of the middle of low-passed samples ``index`` (k,)."""
-        return np.asarray((index + 0.5 * len(self.weights)) * self.block)
+        return np.asarray((index + 0.5 * len(self.weights)) * self.block, float)
 
     def held_noise(self, noise: float) -> float:
         """Noise of ``held`` where that of the signal is white, of rms ``noise``."""

@@ -220,7 +220,7 @@ def rest_of(wanted: Array, known: Array) -> tuple[Array, Array]:
     basis, triangle = np.linalg.qr(known)
     weights = np.linalg.lstsq(triangle, basis.T @ wanted, rcond=DOUBLE)[0]
     fitted = (len(weights) + 1) / len(wanted)
-    return (wanted - known @ weights) / (1.0 - fitted) ** 0.5, weights
+    return (wanted - known @ weights) / (1.0 - fitted) ** 0.5, np.asarray(weights, float)
 
 
 def mean_square(values: Array) -> float:

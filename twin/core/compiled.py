@@ -193,7 +193,7 @@ def borrow(typingctx, arrays):
 
 def _lend(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if isinstance(kind, types.BaseTuple):
-        items = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
+        items = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)  # pyrefly: ignore[bad-argument-type]
         return context.make_tuple(builder, kind, [_lend(context, builder, *i) for i in items])
     lent = context.make_array(kind)(context, builder, value=value)
     lent.meminfo = cgutils.get_null_value(lent.meminfo.type)

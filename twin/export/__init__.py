@@ -165,7 +165,7 @@ def filled(template: str, **values: Any) -> str:
 def _templates() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    found = Environment(
+    found: Any = Environment(
         loader=PackageLoader("twin.export"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip

@@ -128,7 +128,8 @@ def tables(axis: AxisModel, reach: tuple[float, float], speed: float) -> AxisTab
     few = np.linspace(*reach, 33)  # places that tell the mean over the travel at each speed
     own = np.interp(few, positions, along)
     forwards, backwards = (
-        np.array([np.mean(_pass(passed, few, way * v) - own) for v in runs]) for way in (1.0, -1.0)
+        np.array([float(np.mean(_pass(passed, few, way * v) - own)) for v in runs])
+        for way in (1.0, -1.0)
     )
     return AxisTables(
         axis.weighed.mass, positions, along, speeds, forwards, backwards,

@@ -313,11 +313,12 @@ class _Rows:
         style = self._layout.style
         if style.decimal == ",":
             lines = [line.replace(",", ".") for line in lines]
+        stamps: dict[int | str, Callable[[str], int]] = {k: s.add for k, s in self.stamps.items()}
         try:
             values = np.loadtxt(
                 lines, delimiter=style.delimiter, usecols=self._where, comments=None,
                 quotechar='"', dtype=self._type, ndmin=1, encoding=None,
-                converters={k: own.add for k, own in self.stamps.items()},
+                converters=stamps,
             )  # fmt: skip
         except ValueError:
             return None

@@ -117,8 +117,9 @@ class LiveTopics:
             if self._socket is None:
                 self._connect()
                 self.told.append(f"{self.address}: serves again")
+            socket: Any = self._socket
             while True:
-                self._take(self._socket.recv(timeout=0.0))
+                self._take(socket.recv(timeout=0.0))
         except TimeoutError:
             return
         except (OSError, errors.WebSocketException):

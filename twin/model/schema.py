@@ -134,7 +134,8 @@ class HistoryEntry(Entries):
 
     def step(self) -> HistoryStep:
         """As the model holds it."""
-        return HistoryStep(**{**self.model_dump(), "notes": tuple(self.notes)})
+        values: dict[str, Any] = {**self.model_dump(), "notes": tuple(self.notes)}
+        return HistoryStep(**values)
 
 
 class ModelFile(Entries):

@@ -81,7 +81,7 @@ def transmission_of(model: mujoco.MjModel, name: str, axes: Mapping[str, str]) -
             sums = more
             begun.append(float(row @ start) + constant)
     _require_all(model, name, sums)
-    inverse = np.linalg.inv(sums)
+    inverse = np.asarray(np.linalg.inv(sums), float)
     inverse[np.abs(inverse) < ROUNDING * np.abs(inverse).max()] = 0.0
     by = inverse[:, : len(axes)]
     return Transmission(sums[: len(axes)], by, inverse @ begun)

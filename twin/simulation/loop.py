@@ -74,11 +74,11 @@ class Controller:
 
     def response(self, frequency: NDArray[np.float64], period: float) -> NDArray[np.complex128]:
         """Force over reading, less its sign, (k,) N/m at frequencies (k,) Hz; see ``command``."""
-        late = np.exp(-2j * np.pi * frequency * period)
+        late: NDArray[np.complex128] = np.exp(-2j * np.pi * frequency * period)
         kept = math.exp(-2.0 * math.pi * self.filter_bandwidth * period)
         speed = (1.0 - kept) / (1.0 - kept * late) * (1.0 - late) / period
         summed = period * late / (1.0 - late)
-        return np.asarray(self.proportional + self.derivative * speed + self.integral * summed)
+        return self.proportional + self.derivative * speed + self.integral * summed
 
 
 def gain_table(

@@ -202,12 +202,12 @@ def remarks_on(result: Diagnosis, axis: str) -> tuple[str, ...]:
     found, summary = result.axes[axis], result.summaries[axis]
     refit, units = result.refits.get(axis), found.base.axis.units
     every = [
-        refit and refit_in_words(refit),
+        refit_in_words(refit) if refit else None,
         *prepared_in_words(found.dataset),
         *_about_the_fits(found, summary),
-        found.repeat and repeat_in_words(found.repeat),
+        repeat_in_words(found.repeat) if found.repeat else None,
         None if found.dataset.selection else NO_SELECTION_LOG,
-        summary.noise and noise_in_words(summary.noise, units),
+        noise_in_words(summary.noise, units) if summary.noise else None,
         also_chose_in_words(found.dataset.tested_on) if found.findings else None,
     ]
     if why := result.not_planned.get(axis):
