@@ -6,16 +6,18 @@ The compiled laws, FFTs and linear algebra release Python's lock.
 from __future__ import annotations
 
 import itertools
-import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from threading import Lock
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from twin.threads import one_for_matrices
+
+if TYPE_CHECKING:  # a command that only tells of itself needs no pool
+    from concurrent.futures import ThreadPoolExecutor
 
 Progress = Callable[[str, int, int], None]  # what is being done, how much of it, of how much
 AHEAD = "ahead: "  # begins what is told beside that, of nothing (0 of 0): who is ahead so far
@@ -43,7 +45,8 @@ _POOL: ContextVar[ThreadPoolExecutor | Literal["in a job"] | None] = ContextVar(
 
 def cores() -> int:
     """Cores that this process may use; one in a worker of a pool, which shares them out itself."""
-    if multiprocessing.parent_process() is not None:
+    processes = sys.modules.get("multiprocessing")  # which a worker has loaded
+    if processes is not None and processes.parent_process() is not None:
         return 1
     known = hasattr(os, "sched_getaffinity")
     return len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
@@ -59,6 +62,8 @@ def parallel(count: int | None = None) -> Iterator[None]:
     if _POOL.get() is not None:
         yield
         return
+    from concurrent.futures import ThreadPoolExecutor
+
     threads = cores() if count is None else count
     with one_for_matrices(), ThreadPoolExecutor(threads) as pool:  # which starts none by itself
         token = _POOL.set(pool if threads > 1 else "in a job")
@@ -91,8 +96,10 @@ def spread(job: Callable[[T], R], items: Iterable[T], done: Done | None = None) 
 
     one_more()
     alone = len(given) < 2  # a single job may spread its own parts
-    if alone or not isinstance(pool, ThreadPoolExecutor):
+    if alone or pool is None or pool == "in a job":
         return [run(item) for item in given]
+    from concurrent.futures import FIRST_EXCEPTION, wait
+
     inside = copy_context()  # NumPy keeps there which warnings to give
     inside.run(_POOL.set, "in a job")
     jobs = [pool.submit(inside.copy().run, run, item) for item in given]

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from identify.output import require_picture, save_picture
-from twin.effect import Effect
 from twin.model.units import ROTARY
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from identify.dataset.motion import Motion
     from twin.checks import CheckReport
     from twin.checks.long import AxisInfo, LogInfo
+    from twin.effect import Effect
     from twin.export import ExportAgreement, Exported
     from twin.laws.verdict import LawReport
 

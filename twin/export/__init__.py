@@ -15,7 +15,6 @@ from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import quoteattr
 
 from twin.errors import InputError, near
 
@@ -163,6 +162,8 @@ def filled(template: str, **values: Any) -> str:
 
 @cache
 def _templates() -> Any:
+    from xml.sax.saxutils import quoteattr
+
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     found: Any = Environment(
