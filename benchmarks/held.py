@@ -24,7 +24,7 @@ from benchmarks.judgement import Expected, Row, judged, row_of, stated_wrong
 from benchmarks.second_simulator.drives import DRIVES, Plant, Recorder, log_of
 from identify.adding import add
 from identify.analysis.first_model import first_model
-from identify.estimation.fit import error_in
+from identify.estimation.errors import error_in
 from identify.output.words.next_step import next_commands
 from identify.results.results import Diagnosis
 from identify.workflow import diagnose, fit

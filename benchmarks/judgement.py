@@ -12,7 +12,8 @@ from typing import Any
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
-from identify.estimation.fit import Fit, error_if_any
+from identify.estimation.errors import error_if_any
+from identify.estimation.fit import Fit
 from identify.fleet.engine import engine, outcomes
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis

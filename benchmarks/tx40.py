@@ -19,7 +19,8 @@ from benchmarks.withheld import DATA
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Role
 from identify.dataset.preparation import datasets
-from identify.estimation.fit import error_in, fit_axis
+from identify.estimation.errors import error_in
+from identify.estimation.fit import fit_axis
 from identify.results.results import Diagnosis
 from identify.workflow import diagnose
 from twin.effects import load_catalogue

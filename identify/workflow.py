@@ -19,7 +19,8 @@ from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.alignment import aligned, fit_aligned
 from identify.estimation.confounded import refit
 from identify.estimation.disagreement import odd_in
-from identify.estimation.fit import Fit, error_if_any
+from identify.estimation.errors import error_if_any
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import require_finite, require_residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.estimation.offered import not_tried, offered, telling_beside

@@ -10,7 +10,8 @@ from built_fits import PLAIN, axis_of, built, built_dataset, built_fit, fitted, 
 
 from identify.dataset.dataset import Role
 from identify.estimation.confounded import MovedParameter, ParameterShift, Refit
-from identify.estimation.fit import Errors, Outcome
+from identify.estimation.errors import Errors
+from identify.estimation.fit import Outcome
 from identify.estimation.intervals import Estimate, NotExcited
 from identify.estimation.open_loop import Beginning
 from identify.estimation.residual_dependence import Dependence, Repeat

@@ -24,8 +24,9 @@ from benchmarks.selftest.variations import (
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.least_squares import unabsorbed
 from identify.experiment_design.planting import (

@@ -21,7 +21,8 @@ from benchmarks.selftest.machines import (
 )
 from identify.dataset.dataset import Dataset, Role
 from identify.estimation.alignment import fit_aligned
-from identify.estimation.fit import Fit, error_in
+from identify.estimation.errors import error_in
+from identify.estimation.fit import Fit
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, half_widths
 from identify.estimation.least_squares import unabsorbed

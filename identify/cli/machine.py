@@ -23,7 +23,7 @@ from identify.cli.shared import (
     was_kept,
     written,
 )
-from identify.output.machine import briefly, in_shell
+from identify.output.machine import briefly, in_shell, not_determined_in_words
 from twin.errors import InputError
 from twin.export import find_exporter, format_names
 from twin.telling import heard
@@ -130,15 +130,6 @@ def new(
     doubt = misassigned(model, first) if model.joints else None
     rotors = [] if doubt else [*rotors_before_gears(model, first)]
     unknown = {axis: not_determined(found) for axis, found in model.axes.items()}
-    having: dict[str, list[str]] = {}
-    for axis, labels in unknown.items():
-        for label in labels:
-            having.setdefault(label, []).append(axis)
-    notes = [
-        f"{'axis' if len(axes) == 1 else 'axes'} {', '.join(axes)}: {label} is not determined, as "
-        "no break away from rest takes more than Coulomb friction; it is set to that"
-        for label, axes in having.items()
-    ]
     text = (
         f"{out}: axes {', '.join(model.axes)}; now `{in_shell('diagnose', out, *_in_roles(logs))}`"
     )
@@ -148,7 +139,7 @@ def new(
     doubts += [rotor_in_words(found, model) for found in rotors]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
-    return Said("\n".join([text, *notes]), answer, warnings)
+    return Said("\n".join([text, *not_determined_in_words(unknown)]), answer, warnings)
 
 
 def _in_roles(logs: Sequence[Path]) -> list[object]:

@@ -312,17 +312,8 @@ def motion_of(
     blocks, in which a reversal is smeared.
     Raises InputError where the axis is not in the log, does not move, or is too short.
     """
-    if axis not in log.axes:
-        raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
+    _require_motion(log, axis, name)
     readings = log.axes[axis].position
-    least = shortest_log(log.period)
-    if len(log) * log.period < least:
-        raise InputError(
-            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
-            f"{log.sample_rate:g} Hz, so record longer"
-        )
-    if np.ptp(readings) == 0.0:
-        raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
     position, weight = together(readings, log.axes[axis].columns.get("velocity"), log.period)
     ripples = ripple_periods(position) if ripples is None else ripples
     noise = white_noise(position - ripple(position, ripples))
@@ -357,6 +348,20 @@ def motion_of(
         bodies=None if bodies is None else bodies.during(slice(whole)),
         path=Path(columns.readings, block, log.period, min(noise, encoder_noise)),
     )
+
+
+def _require_motion(log: Log, axis: str, name: str) -> None:
+    """Raise InputError where the axis is not in the log, does not move, or it is too short."""
+    if axis not in log.axes:
+        raise InputError(f"{name}: has no axis '{axis}'; it has {', '.join(log.axes)}")
+    least = shortest_log(log.period)
+    if len(log) * log.period < least:
+        raise InputError(
+            f"{name}: lasts {len(log) * log.period:.3g} s; identification needs {least:.3g} s at "
+            f"{log.sample_rate:g} Hz, so record longer"
+        )
+    if np.ptp(log.axes[axis].position) == 0.0:
+        raise InputError(f"{name}: axis {axis} stands still; give a log in which it moves")
 
 
 def shortest_log(period: float) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.coordinates import covered
-from identify.dataset.dataset import Dataset, Role
 from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, motor_gain, moving, split_by_log, sticks
 from identify.dataset.spectrum import lines_in_time
@@ -288,45 +287,6 @@ def at_bounds(fit: Fit, effect: str) -> tuple[str, ...]:
     edges = fit.scaling.at_limit(read(fit.axis, fit.scaling.where))
     each = zip(fit.scaling.where, edges, strict=True)
     return tuple(c.label for c, at_limit in each if at_limit and c.effect == effect)
-
-
-def error_on(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
-    """Force residual (n,) N of a model on other logs, without refitting."""
-    return residual(axis, logs)[moving(logs, sticks(axis))]
-
-
-@dataclass(frozen=True)
-class Errors:
-    """RMS force errors (N) without a change of a model and with it, on the logs of a role."""
-
-    before: float
-    after: float
-    on: Role
-
-    @classmethod
-    def of(cls, before: Fit, after: Fit, dataset: Dataset, on: Role) -> Errors:
-        """The errors of two fits."""
-        first = error_in(on, before, dataset)
-        return cls(first, first if after is before else error_in(on, after, dataset), on)
-
-    def share_of(self, whole: float, floor: float) -> float:
-        """Part of the square of a whole error above a noise floor (N) by which this one falls.
-
-        Of this one before, where that is more: that of a fit without one finding may be.
-        """
-        above = max(whole, self.before) ** 2 - floor**2
-        return min((self.before**2 - self.after**2) / above, 1.0) if above > 0.0 else 0.0
-
-
-def error_in(role: Role, fit: Fit, dataset: Dataset) -> float:
-    """RMS force error (N) on the logs of a role; no number where there are none."""
-    return fit.error if role is Role.TRAINING else rms(error_on(fit.axis, dataset.having(role)))
-
-
-def error_if_any(role: Role, fit: Fit, dataset: Dataset) -> float | None:
-    """The same, or None where there are none, or none that say anything of this model."""
-    logs = dataset.having(role)
-    return error_in(role, fit, dataset) if logs and moving(logs, sticks(fit.axis)).any() else None
 
 
 def _is_added(axis: AxisModel, c: ParameterReference) -> bool:

@@ -26,8 +26,9 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectrum import Record, find_lines
 from identify.dataset.test_function import OVERLAP
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import SURE, blocks_of, by_blocks, effective_samples, rms
-from identify.estimation.fit import LINES, Fit, Outcome, error_on, finished
+from identify.estimation.fit import LINES, Fit, Outcome, finished
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE

@@ -18,7 +18,8 @@ import numpy as np
 from identify.dataset.bodies import Joints
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog
-from identify.estimation.fit import Errors, Fit
+from identify.estimation.errors import Errors
+from identify.estimation.fit import Fit
 from identify.selection.acceptance import Score
 from identify.selection.findings import confidence
 from twin.model.machine import MachineModel

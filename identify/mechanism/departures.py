@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.estimation.fit import Errors, Fit, fit_axis
+from identify.estimation.errors import Errors
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths_by
 from identify.mechanism.bodies import Body, WrongBody
 from identify.mechanism.choice import Choice, Moved

@@ -16,11 +16,13 @@ from identify.output.answers import (
     SCHEMA,
     Answer,
     answer_of,
+    bodies,
     diagnoses,
     fits,
     fleet,
     frequency,
     machine,
+    plans,
     project,
 )
 from twin.effects import Catalogue
@@ -64,7 +66,7 @@ def answers() -> list[type[Answer]]:
     """The class of every object that a command prints."""
     known = {
         k: v
-        for module in (machine, fits, diagnoses, frequency, fleet, project)
+        for module in (machine, fits, diagnoses, bodies, plans, frequency, fleet, project)
         for k, v in vars(module).items()
     }
     return [v for k, v in known.items() if k.endswith("Answer") and v is not Answer]

@@ -155,6 +155,19 @@ def minor(findings: Sequence[str]) -> list[str]:
     return [line for line in findings if ": warning: " in line and ASSUMES not in line]
 
 
+def not_determined_in_words(unknown: Mapping[str, Sequence[str]]) -> list[str]:
+    """What the logs do not tell, of axes by the parameter; ``unknown``: labels of each axis."""
+    having: dict[str, list[str]] = {}
+    for axis, labels in unknown.items():
+        for label in labels:
+            having.setdefault(label, []).append(axis)
+    return [
+        f"{'axis' if len(axes) == 1 else 'axes'} {', '.join(axes)}: {label} is not determined, as "
+        "no break away from rest takes more than Coulomb friction; it is set to that"
+        for label, axes in having.items()
+    ]
+
+
 def briefly(findings: Sequence[str]) -> list[str]:
     """Findings on logs, the minor ones on each log in one line, as `twin check` tells them.
 

@@ -13,8 +13,9 @@ from identify.analysis.recording import Recording
 from identify.dataset.dataset import Dataset, Role, by_log
 from identify.dataset.noise_floor import NoiseFloor, floor_of, known_floor
 from identify.estimation.confounded import MovedParameter, Refit, moved_parameters
+from identify.estimation.errors import Errors, error_if_any, error_in, error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Errors, Fit, error_if_any, error_in, error_on
+from identify.estimation.fit import Fit
 from identify.estimation.intervals import Estimate, estimates, intervals_to_keep
 from identify.estimation.offered import NotTried
 from identify.estimation.simulated_motion import MotionFit

@@ -12,6 +12,7 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import noise_beside
 from identify.estimation.alignment import depends_on_time_origin, phases_found
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import (
     Evidence,
     Gain,
@@ -21,7 +22,7 @@ from identify.estimation.evidence import (
     noise_gain,
     rms,
 )
-from identify.estimation.fit import Fit, at_bounds, error_on
+from identify.estimation.fit import Fit, at_bounds
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE

@@ -9,7 +9,8 @@ from functools import cached_property
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.time_scale import TEST_FUNCTIONS
-from identify.estimation.fit import Errors, Fit, finished
+from identify.estimation.errors import Errors
+from identify.estimation.fit import Fit, finished
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.rules import RULE
 from identify.selection.candidates import Candidate

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field, replace
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import SETTLED, fit_aligned, realigned
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, finished
+from identify.estimation.fit import Fit, finished
 from identify.estimation.residual_noise import with_own_noise
 from identify.rules import RULE
 from identify.selection.acceptance import Judged

@@ -19,8 +19,9 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from identify.dataset.dataset import Dataset, Role
+from identify.estimation.errors import Errors, error_in
 from identify.estimation.evidence import BETTER
-from identify.estimation.fit import Errors, Fit, error_in, finished, fit_axis, fit_themselves
+from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt

@@ -17,8 +17,9 @@ import numpy as np
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import begun_at, realigned, synchronised, time_origins
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE

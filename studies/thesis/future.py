@@ -19,8 +19,9 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import evidence, rms
-from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import steady_friction
 from identify.estimation.intervals import half_widths
 from identify.output.numbers import spaced

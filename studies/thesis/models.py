@@ -19,8 +19,9 @@ import numpy as np
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
 from identify.dataset.preparation import datasets
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on, fit_axis
+from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_balance import force_along
 from identify.output.numbers import spaced
 from identify.output.report.page import Block

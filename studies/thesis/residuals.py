@@ -13,8 +13,9 @@ import numpy as np
 
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.alignment import fit_aligned, realigned
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on
+from identify.estimation.fit import Fit
 from identify.output.numbers import spaced
 from identify.output.report.page import Block, Heading
 from identify.output.report.residual import residual_test_blocks

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import datasets
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import Fit, error_on
+from identify.estimation.fit import Fit
 from identify.output.report.page import Block
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue

@@ -20,8 +20,8 @@ from planted_logs import SLIDE
 
 from identify import demo
 from identify.dataset.preparation import datasets
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import error_on
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.examples import EXAMPLES, examples_folder, write_example

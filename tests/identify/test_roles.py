@@ -16,8 +16,8 @@ from identify import workflow
 from identify.dataset.dataset import Role
 from identify.dataset.preparation import datasets
 from identify.estimation.alignment import realigned
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import error_on
 from identify.output.as_json import json_of
 from identify.results.results import Diagnosis
 from identify.selection.diagnosis import Verdict

@@ -1,4 +1,4 @@
-"""The JSON of diagnoses, planned experiments and added effects."""
+"""The JSON of diagnoses and added effects."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from identify.dataset.dataset import Role
-from identify.experiment_design.discrimination import SimulatedExperiment
-from identify.experiment_design.plan import Plan
-from identify.mechanism.bodies import INERTIAL, WrongBody
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
+from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
@@ -18,6 +16,7 @@ from identify.output.answers.fits import (
     RefitEntry,
     estimate_entries,
 )
+from identify.output.answers.plans import PlanAnswer
 from identify.output.words.diagnosis import (
     advice,
     model_change_in_words,
@@ -26,77 +25,13 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.findings import pairs_in_words
-from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
-from identify.results.results import Addition, AllAdded, CorrectedBody, Diagnosis
+from identify.results.results import Addition, AllAdded, Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind
 from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
-from twin.experiments.file import parameters
-from twin.experiments.kinds import kind_of
 from twin.model.file import format_model
-from twin.model.machine import MachineModel
-
-# --- planned experiments ---------------------------------------------------------------------
-
-
-class ExperimentEntry(Entry):
-    """An experiment as it was simulated, and what it is expected to show."""
-
-    experiment: dict[str, Any]
-    """Its kind and its parameters, as in the TOML file."""
-    duration: Number
-    duration_unit: str = "s"
-    expected_difference: Number = read("difference")
-    noise_floor: Number = read("floor")
-    unit: str = read("units.force")
-    delta_bic: Number
-    """Expected evidence between two explanations; null of one."""
-    information: Number
-    """On the parameters of one model, nats; null of two explanations."""
-
-
-class PlanAnswer(Answer, ExperimentEntry):
-    """What `twin plan` prints: the chosen experiment, and those it was chosen from."""
-
-    axis: str
-    between: list[str]
-    decides: bool
-    excited_by: dict[str, str]
-    favoured_by_the_logs: str | None = read("favoured")
-    refitted_on_logs: bool
-    missing_motion: str
-    ranking: list[ExperimentEntry]
-    not_run: list[str]
-    file: File | None = None
-    setpoints: File | None = None
-
-
-@answer_of.register
-def _(result: Plan, **more: Any) -> PlanAnswer:
-    several = len(result.between) > 1
-    return PlanAnswer.of(
-        result,
-        result.chosen,
-        **_experiment(result.chosen, several),
-        refitted_on_logs=not result.supposed,
-        missing_motion=gap_in_words(result.gap),
-        ranking=[ExperimentEntry.of(t, **_experiment(t, several)) for t in in_order(result)],
-        not_run=[not_run_in_words(n) for n in result.not_run],
-        **more,
-    )
-
-
-def _experiment(t: SimulatedExperiment, several: bool) -> dict[str, Any]:
-    return {
-        "experiment": {"kind": kind_of(t.experiment), **parameters(t.experiment)},
-        "delta_bic": t.gain if several else None,
-        "information": None if several else t.gain,
-    }
-
-
-# --- candidates and additions ----------------------------------------------------------------
 
 
 class ValuesEntry(Entry):
@@ -391,60 +326,6 @@ class DiagnosisEntry(Entry):
     next_experiment_refused: str | None
 
 
-class InertialEntry(Entry):
-    """An inertial parameter of a body, about the body's own frame."""
-
-    more: Number
-    """Than in the file."""
-    band_90: Number
-    """Half of its 90 % band."""
-    unit: str
-
-
-class ErrorsEntry(Entry):
-    """RMS force errors of an axis without and with a change."""
-
-    before: Number
-    after: Number
-    on: Role
-    unit: str
-
-
-class BodyEntry(Entry):
-    """A body of a mechanism whose inertia is not that of its file."""
-
-    body: str
-    ambiguous_with: list[str] = read("tied")
-    axes: list[str]
-    """Whose forces it changes."""
-    confidence: Number
-    part: Number = read("score.part")
-    t: Number = read("score.t")
-    control: Number = read("score.control")
-    parameters: dict[str, InertialEntry]
-    """That differ from the file by more than their band."""
-    not_told: list[str] = read("undetermined")
-    """By these joints, or only together with others."""
-    disagreeing: list[str]
-    """Logs that by themselves tell another change."""
-    errors: dict[str, ErrorsEntry]
-
-
-class BodyAnswer(Answer, BodyEntry):
-    """What `twin add link_mass` prints: the body that was corrected, and what was written."""
-
-    element: str
-    mujoco: str
-    """The file that has it."""
-    left_out: list[str] = Field([])
-
-
-@answer_of.register
-def _(result: CorrectedBody, **more: Any) -> BodyAnswer:
-    own, file = _of_body(result.body, result.given), result.model.mjcf_name
-    return BodyAnswer.of(result.body, element=result.element, mujoco=file, **own, **more)
-
-
 class DiagnosisAnswer(Answer, DiagnosisEntry):
     """What `twin diagnose` prints: the axis that the answer is about, and the same by axis."""
 
@@ -467,7 +348,7 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
 @answer_of.register
 def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
-    bodies = [BodyEntry.of(body, **_of_body(body, result.fitted)) for body in result.bodies]
+    bodies = [BodyEntry.of(body, **values_of_body(body, result.fitted)) for body in result.bodies]
     body = next(iter(bodies), None)
     recording = result.recording and RecordingEntry.of(result.recording)
     leading, model = axes[result.leading.dataset.axis], result.model
@@ -476,19 +357,6 @@ def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     return DiagnosisAnswer.of(
         leading, axes=axes, body=body, recording=recording, bodies=bodies, **written, **more
     )
-
-
-def _of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:
-    """Its parameters and errors, with their units."""
-    told = {
-        name: InertialEntry(more=value, band_90=band, unit=INERTIAL[name])
-        for name, (value, band) in found.differing.items()
-    }
-    errors = {
-        axis: ErrorsEntry.of(own, unit=model.axes[axis].units.force)
-        for axis, own in found.errors.items()
-    }
-    return {"parameters": told, "errors": errors}
 
 
 def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:

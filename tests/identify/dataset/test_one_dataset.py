@@ -26,8 +26,9 @@ from identify.dataset.prepared_log import moving
 from identify.dataset.test_function import LEAST_BLOCKS
 from identify.dataset.time_scale import FOREIGN, HELD, AtLength, beginnings
 from identify.estimation.alignment import aligned, realigned
+from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
-from identify.estimation.fit import error_on, fit_axis
+from identify.estimation.fit import fit_axis
 from identify.output.as_json import json_of
 from identify.output.text import fit_text
 from identify.output.words.fit import prepared_in_words

@@ -25,7 +25,8 @@ from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, moving
-from identify.estimation.fit import Fit, Outcome, at_bounds, error_on, finished, fit_axis, rms
+from identify.estimation.errors import error_on
+from identify.estimation.fit import Fit, Outcome, at_bounds, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
 from identify.estimation.scaling import Scaling

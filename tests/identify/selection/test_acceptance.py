@@ -25,8 +25,9 @@ from machines import CATALOGUE
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import PreparedLog, split_by_log, sticks
+from identify.estimation.errors import Errors
 from identify.estimation.evidence import BLOCKS
-from identify.estimation.fit import Errors, fit_axis
+from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import tried_shapes

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from identify.adding import add
 from identify.dataset.dataset import Role
-from identify.estimation.fit import error_in
+from identify.estimation.errors import error_in
 from identify.selection.diagnosis import Verdict
 from identify.workflow import diagnose
 from twin.importers import import_log, load_mapping
