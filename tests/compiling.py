@@ -44,11 +44,4 @@ def mujoco() -> None:
     simulate(BARE, "moves", duration=0.1, simulator=MujocoSimulator)
 
 
-def second_simulator() -> None:
-    """The simulator of benchmarks/second_simulator/."""
-    from benchmarks.second_simulator.machine import drawn, run
-
-    run(drawn(np.random.default_rng(0), 1e3), 1, 0.5)
-
-
-PARTS = (laws, reduced, measured, mujoco, second_simulator)
+PARTS = (laws, reduced, measured, mujoco)

@@ -39,9 +39,22 @@ LONGEST = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest asks which are slow
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for cases in _by_function(items).values():
+        if (short := cases[0].get_closest_marker("short")) is not None:
+            for item in cases[short.args[0] :]:
+                item.add_marker(pytest.mark.slow)
     order = {name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(item.path.stem, len(order)))
+
+
+def _by_function(items: list[pytest.Item]) -> dict[str, list[pytest.Item]]:
+    """The cases of each test function, in their order."""
+    found: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        found.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    return found
 
 
 @pytest.fixture(scope="session")

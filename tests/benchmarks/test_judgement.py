@@ -29,6 +29,7 @@ def found() -> AxisDiagnosis:
     return diagnosed(STAGE, machine, 5, 6.0, FEW)
 
 
+@pytest.mark.slow
 def test_a_row_holds_the_answer_and_whether_it_is_right(found: AxisDiagnosis) -> None:
     row = json.loads(json.dumps(row_of("a machine", Expected(("cogging",)), found, 1.0)))
     (finding,) = row["findings"]
@@ -96,6 +97,7 @@ def test_without_the_measurements_nothing_is_judged(
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_each_real_machine_is_read_with_its_axis_and_its_motion(shared_data: Path) -> None:
     for given in {c.given: c for c in CASES}.values():
         roles = given.given(shared_data)

@@ -54,6 +54,7 @@ def test_the_recording_goes_from_csv_to_a_fitted_model_as_printed(tmp_path) -> N
     assert fitted.axes["x"].mass == pytest.approx(true.axes["x"].mass, rel=0.05)
 
 
+@pytest.mark.slow
 def test_hidden_effect_has_a_log_of_each_role(tmp_path) -> None:
     example, files = write_example("hidden_effect", tmp_path / "new")
     assert [file.name for file in files] == ["fit.mcap", "held.mcap", "test.mcap"]

@@ -6,6 +6,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from threading import Barrier
 
+import pytest
 from planted_logs import RATE, SLIDE, Ride, few, having, logged
 
 from identify import workflow
@@ -29,6 +30,7 @@ def diagnosed(copy: str) -> tuple[dict, list[str]]:
     return json_of(found), said
 
 
+@pytest.mark.slow
 def test_two_diagnoses_at_once_are_those_of_one_after_the_other():
     names = ("again", "once more")
     alone = [diagnosed(name) for name in names]
@@ -56,6 +58,7 @@ def cores_of_a_worker(_: int) -> int:
     return cores()
 
 
+@pytest.mark.slow
 def test_a_worker_of_a_pool_spreads_nothing_as_the_pool_has_the_cores():
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         assert [*pool.map(cores_of_a_worker, [1])] == [1]

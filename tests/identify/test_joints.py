@@ -132,6 +132,7 @@ def test_a_joint_that_follows_an_axis_needs_no_sensor():
     assert all(max(run[joint].position_error.values()) < 2e-3 for joint in JOINTS[:2])
 
 
+@pytest.mark.slow
 def test_friction_of_a_tendon_is_found_on_its_axis_and_nowhere_else():
     """Of a file that is proposed by the motors' names, whose own friction is but a beginning."""
     logs = {str(seed): coupled_log(seed) for seed in (1, 2)}
@@ -263,6 +264,7 @@ def heavier(model):
     model.body_mass[:] *= 1.05
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("planted", "refused"),
     [
@@ -327,6 +329,7 @@ def planned(folder):
     return model, Catalogue(rivals), poor, held, found
 
 
+@pytest.mark.slow
 def test_an_experiment_is_planned_that_decides_between_laws_of_a_joint(planned):
     *_, found = planned
     assert found.decides
@@ -393,6 +396,7 @@ def test_friction_that_follows_the_load_is_fitted_where_the_load_hardly_changes(
     assert axis["coulomb_viscous"].values["Fc"] == pytest.approx(COULOMB[1], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_constant_force_is_no_torque_constant(folder):
     """Of 4 % of the weight, which masses could be: the motor had been named with 98 %."""
     logs = [arm_log(s, lambda q, v: np.add(friction(q, v), [0.0, 0.0, 0.1])) for s in (101, 102)]
@@ -422,6 +426,7 @@ def heavier_upper_arm(model: mujoco.MjModel) -> None:
     model.body_mass[model.body("upper").id] *= 1.15
 
 
+@pytest.mark.slow
 def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     logs = [arm_log(seed, change=loaded) for seed in (11, 12)]
     found = diagnose(folder / "arm.toml", {"a": logs[0]}, {"b": logs[1]}, catalogue=FEW)
@@ -474,6 +479,7 @@ def test_the_bands_of_a_body_hold_the_truth(folder, monkeypatch):
     assert 0.85 <= np.mean(np.array(off) < 1.0) < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "gain", "body", "motor"),
     [

@@ -47,6 +47,7 @@ def laws_of(model: MachineModel) -> list[str]:
     return [f.effect.summary for f in model.axes["x"].effects]
 
 
+@pytest.mark.slow
 def test_a_fit_in_another_process_is_the_same():
     case, own = cogging_case(), with_own_effect()
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:

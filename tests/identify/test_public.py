@@ -214,6 +214,7 @@ def test_every_message_is_what_was_written(tmp_path: Path) -> None:
         write_topics({"/a": {"b": np.array([np.nan])}}, {}, 1.0, tmp_path / "b.mcap")
 
 
+@pytest.mark.slow
 def test_measured_is_model_and_residual_and_the_layout_shows_them(tmp_path: Path) -> None:
     with in_small(duration=2.0):
         cli_runs.twin("simulate", "tracking", "-o", "l.mcap", folder=tmp_path)

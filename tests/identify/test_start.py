@@ -71,6 +71,7 @@ def test_matrices_are_not_shared_out_unless_the_user_says_so(tmp_path: Path) -> 
     assert found["threads"] == {**dict.fromkeys(VARIABLES, "1"), "OMP_NUM_THREADS": "3"}
 
 
+@pytest.mark.slow
 def test_a_fit_is_not_slower_to_load_than_to_run(tmp_path: Path) -> None:
     """SciPy's larger parts take a second to load, the smaller ones half of one, as a fit runs.
 
@@ -150,6 +151,7 @@ def wait_until_heeded(pid: int) -> None:
         caught = int(status.read_text().partition("SigCgt:")[2].split()[0], 16)
 
 
+@pytest.mark.short(3)
 @POSIX
 @ENDINGS
 @pytest.mark.parametrize("seconds", [0.0, 1.0])
@@ -247,6 +249,7 @@ def run(script: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_in_lines_what_it_does_and_its_answer_stays_alone() -> None:
     done = run(DIAGNOSIS)
     assert json.loads(done.stdout) == ["x", "y"]

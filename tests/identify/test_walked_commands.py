@@ -107,7 +107,8 @@ def beginning(folder: Path, names: tuple[str, ...]) -> list[str]:
         *imports, ("check", *logs), ("new", *logs, "-o", "MODEL é.toml"))]  # fmt: skip
 
 
-@pytest.mark.parametrize("machine", [one_axis, two_axes])
+@pytest.mark.short(1)
+@pytest.mark.parametrize("machine", [two_axes, one_axis])
 def test_what_is_printed_before_a_diagnosis_works(tmp_path, machine):
     names = machine(tmp_path, 3.0)
     done = walked(beginning(tmp_path, names)[:-1], tmp_path)

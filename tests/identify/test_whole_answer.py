@@ -44,6 +44,7 @@ def beyond(found: AxisDiagnosis) -> set[str]:
     return {n for n in final.names if n not in base.names} | freed
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("name", HELD)
 def test_every_law_of_the_final_model_belongs_to_a_finding(name: str) -> None:
     logs = [{f"{i}": logged(HELD[name], Ride(i))} for i in (1, 2, 3)]
@@ -126,6 +127,7 @@ def test_what_is_no_answer_is_refused_in_one_line(drive: Path, answer: dict) -> 
     )
 
 
+@pytest.mark.slow
 def test_the_next_command_is_done_once_the_model_is_written(drive: Path, answer: dict) -> None:
     first = twin("diagnose", "m.toml", *ROLES, folder=drive).stdout
     assert f"next: twin diagnose m.toml {' '.join(ROLES)} --model better.toml" in first

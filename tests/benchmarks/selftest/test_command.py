@@ -90,6 +90,7 @@ def test_the_machines_are_those_asked_for():
     assert again == [Case(("wear",), 5.0, 17, "bumps"), Case((), 0.0, 3)]
 
 
+@pytest.mark.slow
 def test_a_failing_machine_is_named():
     with pytest.raises(RuntimeError, match="no such effect"):
         run_all([Case(("no such effect",), 5.0, 1)], workers=1)

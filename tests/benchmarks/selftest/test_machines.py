@@ -82,6 +82,7 @@ def test_a_machine_is_logged_for_training_selection_and_test():
     assert 0.0 < abs(empty.true.axes["x"].mass / STAGE.axes["x"].mass - 1.0) < 0.1
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("strength", [2.0, 6.0])
 def test_an_effect_has_the_strength_that_was_asked_beyond_what_the_model_takes_over(strength):
     """In noise floors, which are what the machine's own laws leave."""
@@ -95,6 +96,7 @@ def test_an_effect_has_the_strength_that_was_asked_beyond_what_the_model_takes_o
         prepared(found, 4.0 * strength)
 
 
+@pytest.mark.slow
 def test_a_mass_that_would_hide_an_effect_was_weighed():
     found = built("payload_mass")
     assert found.model.axes["x"].mass_fixed
@@ -103,6 +105,7 @@ def test_a_mass_that_would_hide_an_effect_was_weighed():
         built("actuator_saturation", strength=1e6)
 
 
+@pytest.mark.slow
 def test_a_friction_is_planted_first_and_scaled_until_the_model_falls_short():
     found = built("cogging", "gms")
     assert [f.effect.name for f in found.planted] == ["gms", "cogging"]

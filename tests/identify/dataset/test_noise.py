@@ -39,7 +39,6 @@ DRIVES = {
     "every 5th, rounded, current known well": (2e3, 5e-7, 1e-7, 0.0),
     "every 10th": (1e3, 0.0, 1e-7, 2e-3),
 }
-QUICK = ("white", "rounded", "every 5th, rounded", "every 10th")
 
 
 def log_of_drive(name, seed=2, duration=8.0):
@@ -51,11 +50,9 @@ def log_of_drive(name, seed=2, duration=8.0):
     return run(machine, seed, duration)
 
 
-@pytest.mark.parametrize("length", [0.1, pytest.param(0.2, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    "drive",
-    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in DRIVES],
-)
+@pytest.mark.slow  # as the others of `drawn`: the second simulator is compiled in ten seconds
+@pytest.mark.parametrize("length", [0.1, 0.2])
+@pytest.mark.parametrize("drive", DRIVES)
 def test_the_floor_is_what_the_true_model_leaves(drive, length):
     fit = workflow.fit(STAGE, {"log": log_of_drive(drive)}, test_function=length).fits["x"]
     floor = noise_beside(fit.axis, fit.logs)
@@ -72,6 +69,7 @@ def test_the_floor_is_what_the_true_model_leaves(drive, length):
         assert floor.parts["aliasing"] == 0.0
 
 
+@pytest.mark.slow
 def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     machine = drawn(np.random.default_rng(3), 10e3, resolution=5e-7, encoder_noise=0.0)
     fit = workflow.fit(STAGE, {"log": run(machine, 3, 8.0)}, test_function=0.1).fits["x"]

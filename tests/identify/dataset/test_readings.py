@@ -65,6 +65,7 @@ def test_it_is_not_named_where_other_noise_is_larger():
     assert found.verdict is Verdict.NOTHING_MISSING
 
 
+@pytest.mark.slow
 def test_it_is_not_named_for_an_error_it_cannot_make(coarse):
     """The resolution is there, but twice the force error that it could pretend."""
     louder = tuple(_with_more_force(log) for log in coarse.training)

@@ -115,6 +115,7 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     assert "by 57 degrees" in words
 
 
+@pytest.mark.slow
 def test_a_force_with_another_phase_in_each_log_is_told():
     def log(phase, name, pitch=2.3e-3, size=0.3):
         m = ridden(lambda m: size * np.sin(2.0 * np.pi * m.position / pitch + phase))

@@ -56,6 +56,7 @@ ODD = AxisModel(
 LOGS = [windowed(moved(np.random.default_rng(k), 1.5, 1000.0)) for k in (1, 2)]
 
 
+@pytest.mark.slow
 def test_a_fit_of_many_columns_holds_them_little_more_than_twice():
     """As they are and as its search follows them; with the rest that is 2.7 times."""
     logs = [windowed(moved(np.random.default_rng(k), 40.0, 1000.0)) for k in (1, 2)]

@@ -94,6 +94,7 @@ def fit_to(label: str, value: float) -> FitResult:
     return workflow.fit(NOMINAL, {"fit": logged(label, value)}, catalogue=CATALOGUE)
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("label", "value"),
     [("mass", 15.6), ("cable_slab.offset", 0.6), ("cable_slab.k1", 4.0)],
@@ -113,6 +114,7 @@ def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
     assert forces[0] == pytest.approx((found.given**2 - found.refitted**2) ** 0.5, rel=0.1)
 
 
+@pytest.mark.slow
 def test_true_values_are_not_told_and_what_is_said_to_be_the_same_force_is() -> None:
     """With the mass held, that effect takes the error to where refitting the mass did."""
     true = NOMINAL.axes["x"]["cable_slab"].values["offset"]

@@ -147,6 +147,7 @@ def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     assert not after.ambiguous_with or truth == SIMPLER
 
 
+@pytest.mark.slow
 def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     case = CASES["delay"]
     machine = case.machine("actuator_delay")
@@ -293,6 +294,7 @@ def arena_of(stage: MachineModel, **options: float) -> Arena:
     return Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),), **options)
 
 
+@pytest.mark.slow
 def test_what_a_weak_motor_cannot_do_is_not_planned():
     stage = replace(one_axis(WEAK), sample_rate=RATE)
     trials, not_run = contest(arena_of(stage), proposals(stage, "x", 20.0)[0])

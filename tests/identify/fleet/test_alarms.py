@@ -24,6 +24,7 @@ def nights(seed: int, machines: int = 6, count: int = 90) -> np.ndarray:
     return own * (1.0 + SCATTER * rng.standard_normal((machines, count)))
 
 
+@pytest.mark.slow
 def test_machines_that_are_well_raise_none() -> None:
     for seed in range(3):
         assert alarms_of([panel(nights(seed, count=300))]) == ()

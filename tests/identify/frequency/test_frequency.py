@@ -47,6 +47,7 @@ def test_the_response_is_that_of_the_machine_and_its_band_holds_it(setpoint: Set
     assert np.median(np.abs(found.plant / true - 1.0)[told]) < 0.02
 
 
+@pytest.mark.short(2)
 @pytest.mark.parametrize("setpoint", [multisine, wandering])
 @pytest.mark.parametrize("delay", [0.0, pytest.param(0.4e-3, marks=pytest.mark.slow), 1.3e-3])
 def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float) -> None:
@@ -177,6 +178,7 @@ def geared(request: pytest.FixtureRequest) -> tuple[TwoMasses, list[Log]]:
     return machine, logs
 
 
+@pytest.mark.slow
 def test_an_elastic_gear_is_seen_through_and_named(geared: tuple[TwoMasses, list[Log]]) -> None:
     machine, logs = geared
     plant = identify.frequency_response(logs).axes["q"].measured.plant
@@ -252,6 +254,7 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_a_page_shows_it_beside_the_model(log: Path, elastic: MachineModel, tmp_path: Path) -> None:
     save_model(elastic, tmp_path / "m.toml")
     done = twin("compare", "m.toml", log, "-o", "page.html", folder=tmp_path)

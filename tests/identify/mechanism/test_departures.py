@@ -45,6 +45,7 @@ def named(found):
     return [(m.group.what, m.group.place) for m in found.moved]
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("changed", "right"),
     [
@@ -67,6 +68,7 @@ def test_what_is_changed_must_move_and_nothing_else(changed, right):
         assert body.change[0] == pytest.approx(0.8, abs=max(body.band[0], 0.04))
 
 
+@pytest.mark.slow
 def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_value():
     changed = Changed(rotor={1: 0.4 * OWN[1]})
     logs = [{f"{i}": log_of(ARM, changed, 30 + i, 8.0)} for i in range(2)]
@@ -82,6 +84,7 @@ def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_val
     assert given == pytest.approx(ARM.armature[1] + 0.4 * OWN[1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_logs_of_a_load_that_is_held_another_way_disagree():
     ways = [Changed(payload=0.8, held=(0.25, 0.0, z)) for z in (0.1, -0.1)]
     logs = [{f"{i}": log_of(ARM, way, 50 + i, 8.0)} for i, way in enumerate(ways)]

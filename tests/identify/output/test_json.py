@@ -184,6 +184,7 @@ COMPUTES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_writing_what_was_diagnosed_runs_no_law_and_no_fit() -> None:
     """Whatever is told has been computed before: a slow report would be a hidden computation."""
     case, ran = cogging_case(), set()

@@ -51,6 +51,7 @@ def test_the_answer_comes_first_fits_the_window_and_its_command_is_copied(page: 
     assert copied == "Copied"
 
 
+@pytest.mark.slow
 def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
     zoomed = page.run("""
       const all = span("forces"), note = text("coordinate-note");
@@ -74,6 +75,7 @@ def test_all_plots_follow_a_zoom_in_time(page: Browser) -> None:
     assert zoomed["units"] == ["Time (s), log after log", "Position (mm)"]
 
 
+@pytest.mark.slow
 def test_a_drag_zooms_and_a_log_can_be_chosen(page: Browser) -> None:
     before, box = page.run("""const b = document.querySelector("#left .u-over")
       .getBoundingClientRect(); scrollTo(0, b.top - 100);
@@ -96,6 +98,7 @@ def test_a_drag_zooms_and_a_log_can_be_chosen(page: Browser) -> None:
     assert "run 2 (selection)" in chosen[1]
 
 
+@pytest.mark.slow
 def test_any_signal_is_shown_over_any_coordinate(page: Browser) -> None:
     seen = page.run("""
       const u = () => document.getElementById("coordinate").shown, out = [];

@@ -31,11 +31,13 @@ def test_an_effect_of_the_catalogue_is_named() -> None:
     assert answer.best.effect.name in planted.right
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_planted() -> None:
     machine = drawn(np.random.default_rng(1), RATE)
     assert diagnosed(STAGE, machine, 1, 6.0, FEW).verdict is Verdict.NOTHING_MISSING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hidden", ["nothing", pytest.param("ripple", marks=pytest.mark.slow)])
 def test_noise_of_the_force_is_no_friction_that_grows_with_it(hidden: str) -> None:
     """A servo of 1 kHz logged at 200 Hz: what thinning folds into its force is half of it."""
@@ -96,6 +98,7 @@ def found(step: float, height: float = 0.0) -> AxisDiagnosis:
     return identify.diagnose(identify.first_model(logs), logs, held).axes["x"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-6, pytest.param(1e-8, marks=pytest.mark.slow)])
 def test_nothing_is_missing(step: float) -> None:
     """Noise of the readings is as fast as what sticks for some milliseconds and is at rest."""

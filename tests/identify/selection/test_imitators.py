@@ -39,6 +39,7 @@ def fitted(
     return begun(base, {"one": one, "two": two}, {"held": held})
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("known", [(), ("spring",)])
 def test_what_does_not_slip_within_the_travel_is_a_spring(known):
     """Named as friction with 99 %, one without a bound: Fc = 5e14 N."""
@@ -49,6 +50,7 @@ def test_what_does_not_slip_within_the_travel_is_a_spring(known):
     assert all(refused[name].endswith("so that it is a spring here") for name in sticking)
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("imitator", "mass", "gain", "told"),
     [

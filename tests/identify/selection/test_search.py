@@ -75,6 +75,7 @@ def test_selection_logs_may_ask_for_the_larger_of_tied_changes(fitted, held, nam
     assert simplest((many, few)).change.name == named
 
 
+@pytest.mark.slow
 def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
     """An offset takes most of an asymmetric friction, until wear leaves more of it to see."""
     found = searched(
@@ -88,6 +89,7 @@ def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
     assert found.final.at_floor
 
 
+@pytest.mark.slow
 def test_two_that_distort_each_other_are_found_together() -> None:
     """Neither is accepted alone: each leaves what the other makes of the motion."""
     catalogue = (*BOTH, "quadratic_drag", "spring")
@@ -113,6 +115,7 @@ def test_two_laws_are_asked_together_before_a_free_curve_takes_both() -> None:
     assert set(found.named) == set(both)
 
 
+@pytest.mark.slow
 def test_a_law_that_became_another_is_tried_from_its_other_starts() -> None:
     """One period near the reach follows two short ones best, and is no period any more."""
 
@@ -140,6 +143,7 @@ def with_drag(power: float, size: float) -> AxisDiagnosis:
     return asked(SLIDE, SLIDE, few("quadratic_drag", "wear", "cogging"), drag, RIDE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.02, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_a_drag_of_another_power_is_told_as_such_even_where_the_law_reaches_the_noise(size):
     (finding,) = with_drag(3.0, size).findings
@@ -150,6 +154,7 @@ def test_a_drag_of_another_power_is_told_as_such_even_where_the_law_reaches_the_
     assert (true.effect, true.kind, true.bend) == ("quadratic_drag", FindingKind.MISSING, None)
 
 
+@pytest.mark.slow
 def test_a_hard_current_limit_is_named_with_all_of_the_force_above_it_lost():
     stage = PROTON
     stage = MachineModel(stage.name, {"x": stage.axes["x"]}, stage.sample_rate)
@@ -188,6 +193,7 @@ def with_friction(law: str, **values: float) -> AxisModel:
     return bare.with_effect(Fitted.at_start(CATALOGUE[law], {**alike, **values}))
 
 
+@pytest.mark.slow
 def test_of_a_friction_those_that_explain_as_much_are_told_with_the_same_values_free() -> None:
     """The exponent is another than the laws hold: it is free in the one found, so in all."""
     true = with_friction("modified_leuven", Fs=0.4, sigma1=0.7, spread=8.0, reserve=3.0)
@@ -251,6 +257,7 @@ def test_a_law_of_any_machine_is_found_with_its_values(name: str) -> None:
         assert found.fit.axis[name].values[key] == pytest.approx(value, rel=0.05, abs=0.02)
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -45,6 +45,7 @@ def chapters(written: Path) -> dict[str, Any]:
     return json.loads((written / "thesis.json").read_text())["chapters"]
 
 
+@pytest.mark.slow
 def test_every_mean_of_the_simulation_study_is_within_a_thousandth(chapters) -> None:
     chapter = chapters["simulation"]
     assert chapter["snr_db"] == 80.0

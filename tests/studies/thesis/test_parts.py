@@ -100,6 +100,7 @@ def friction(fitted: Fitted) -> np.ndarray:
     return force_along(axis, position, velocity, 1.0 / behaviours.RATE, Kind.FRICTION)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
 def test_a_mixture_is_the_weighted_sum_of_both(weight: float) -> None:
     forgets = {"Fc": 0.3, "Fs": 0.4, "v0": 0.02, "sigma2": 0.5, "sigma0": 900.0, "sigma1": 0.3}

@@ -450,6 +450,7 @@ def test_what_is_written_piece_by_piece_is_what_is_read_as_a_whole(tmp_path, lay
         assert file.read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_recovery_takes_little_memory(tmp_path):
     """As much as the steps that it takes, whatever the length of the log.
 

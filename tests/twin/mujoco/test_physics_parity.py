@@ -100,6 +100,7 @@ def signals(x: AxisModel, y: AxisModel, stage: Stepper, swapped: bool = False) -
     return done[:, ::-1] if swapped else done
 
 
+@pytest.mark.short(16)
 @pytest.mark.parametrize("effect", OF_AXES, ids=lambda e: e.name)
 @pytest.mark.parametrize("stage", BOTH)
 def test_on_the_other_axis_an_effect_does_the_same(effect: Effect, stage: Stepper) -> None:
