@@ -42,6 +42,7 @@ def test_a_row_holds_the_answer_and_whether_it_is_right(found: AxisDiagnosis) ->
     assert "right: missing cogging" in in_line(row)
 
 
+@pytest.mark.slow
 def test_the_same_answer_is_wrong_where_another_effect_or_nothing_is_hidden(
     found: AxisDiagnosis,
 ) -> None:

@@ -56,6 +56,7 @@ def test_every_mean_of_the_simulation_study_is_within_a_thousandth(chapters) -> 
     assert noisy["sigma2"]["sd"] > 30.0 * chapter["parameters"]["sigma2"]["sd"]
 
 
+@pytest.mark.slow
 def test_the_force_reacts_to_a_parameter_by_what_it_is_off(chapters) -> None:
     """Nothing at the planted value; with the viscous coefficient in proportion to the speeds."""
     found = chapters["simulation"]["sensitivity"]
@@ -70,6 +71,7 @@ def test_the_force_reacts_to_a_parameter_by_what_it_is_off(chapters) -> None:
         assert force[20] < 0.1 * min(force[0], force[-1])
 
 
+@pytest.mark.slow
 def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
     cable = chapters["cable"]
     assert cable["rms_error"] < 3e-4
@@ -78,6 +80,7 @@ def test_the_cable_and_the_pitch_are_recovered(chapters) -> None:
     assert len(cable["spikes"]) == 8
 
 
+@pytest.mark.slow
 def test_levels_are_recovered_along_the_track_where_the_map_reads_them_too_low(chapters) -> None:
     chapter = chapters["track"]
     for side in ("forwards", "backwards"):
@@ -89,6 +92,7 @@ def test_levels_are_recovered_along_the_track_where_the_map_reads_them_too_low(c
     assert ahead[0] > ahead[1]  # and falls along the track
 
 
+@pytest.mark.slow
 def test_dynamic_parameters_are_found_where_the_simplex_search_from_rest_is_misled(
     chapters,
 ) -> None:
@@ -105,6 +109,7 @@ def test_dynamic_parameters_are_found_where_the_simplex_search_from_rest_is_misl
     assert first["beginning_estimated"][0] < 1e-3 * first["from_rest"][0]
 
 
+@pytest.mark.slow
 def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
     chapter = chapters["twin"]
     assert chapter["alike"]["agree"]
@@ -118,6 +123,7 @@ def test_machine_and_twin_agree_and_a_changed_mass_is_named(chapters) -> None:
     assert loop["published_emps"] == {"run": 1.375e-4, "pulses": 8.0e-5}
 
 
+@pytest.mark.slow
 def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, chapters) -> None:
     page = (written / "thesis.html").read_text()
     assert "http://" not in page.replace("http://www.w3.org", "")
@@ -127,6 +133,7 @@ def test_the_report_holds_every_chapter_and_needs_nothing_else(written: Path, ch
     assert "Simulation, parameters" in page  # a table of what was found
 
 
+@pytest.mark.slow
 def test_a_chapter_alone_gives_the_same_numbers_and_says_them(
     chapters, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
