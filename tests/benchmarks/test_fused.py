@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from benchmarks import fused
 from benchmarks.simulation import FusedSimulator
@@ -18,6 +19,7 @@ from twin.simulation.simulators import ReducedSimulator, run
 MODEL = load_model("proton_xy", load_catalogue())
 
 
+@pytest.mark.slow
 def test_by_hand_the_reduced_model_gives_the_same_log():
     setpoint = Tracking(3.0).setpoint(MODEL, np.random.default_rng(1))
     ours, hand = (

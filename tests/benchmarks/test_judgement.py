@@ -59,6 +59,7 @@ def test_the_same_answer_is_wrong_where_another_effect_or_nothing_is_hidden(
     assert stated_wrong(rows) == ["a machine: cogging"] * 2
 
 
+@pytest.mark.slow
 def test_a_diagnosis_without_findings_is_silent_unless_there_is_nothing(
     found: AxisDiagnosis,
 ) -> None:

@@ -120,6 +120,7 @@ def tied_log(seed):
     return replace(log, axes={joint: log.axes[joint] for joint in JOINTS[:2]})
 
 
+@pytest.mark.slow
 def test_a_joint_that_follows_an_axis_needs_no_sensor():
     logs = {str(seed): tied_log(seed) for seed in (1, 2)}
     model = first_model(logs, "arm", load_catalogue(), ("arm.xml", TIED))
@@ -384,6 +385,7 @@ def loaded_slowly(seed: int) -> Log:
     return arm_of(position[::2] + 1e-6 * rng.standard_normal(torque.shape), force)
 
 
+@pytest.mark.slow
 def test_friction_that_follows_the_load_is_fitted_where_the_load_hardly_changes(folder):
     """Its prior had held it at 27 times the noise floor, where a profile along the travel won."""
     logs = {str(seed): loaded_slowly(seed) for seed in (1, 2)}

@@ -132,6 +132,7 @@ def slow(units=LINEAR_UNITS) -> Log:
     return Log(1000.0, {"a": AxisLog(columns, units)})
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(("units", "name"), [(LINEAR_UNITS, "mass"), (ROTARY_UNITS, "inertia")])
 def test_a_mass_that_the_logs_do_not_tell_is_given_and_held(tmp_path, units, name):
     write_log(slow(units), tmp_path / "run.mcap")

@@ -17,7 +17,7 @@ HIDDEN = {
 }
 
 
-@pytest.mark.short(2)
+@pytest.mark.short(1)
 @pytest.mark.parametrize("noise", [2e-3, pytest.param(0.1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_every_command_tells_the_same_of_one_log(hidden: str, noise: float) -> None:

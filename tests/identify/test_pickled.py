@@ -60,6 +60,7 @@ def test_a_fit_in_another_process_is_the_same():
     assert again(own) == own
 
 
+@pytest.mark.short(3)
 @pytest.mark.parametrize(
     "result",
     [made.fit_result, made.simulation_fit, made.compared, made.addition, made.diagnosed,
@@ -74,6 +75,7 @@ def test_a_result_says_the_same_when_it_comes_back(result):
     assert str(found) == str(given)
 
 
+@pytest.mark.slow
 def test_what_comes_back_is_worked_with():
     """A fit and a dataset that were kept go on as those that they were."""
     case = cogging_case()

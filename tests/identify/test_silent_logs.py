@@ -169,6 +169,7 @@ def test_every_command_that_takes_logs_is_here():
     assert set(COMMANDS) == set(takes_logs())
 
 
+@pytest.mark.short(14)
 @pytest.mark.parametrize(("use", "name"), SOME, ids=str)
 def test_a_log_that_says_nothing_is_told_in_one_line(folder, monkeypatch, use, name):
     sound(run(folder, monkeypatch, use, name), *use, name)

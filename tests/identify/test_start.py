@@ -151,7 +151,7 @@ def wait_until_heeded(pid: int) -> None:
         caught = int(status.read_text().partition("SigCgt:")[2].split()[0], 16)
 
 
-@pytest.mark.short(3)
+@pytest.mark.short(2)
 @POSIX
 @ENDINGS
 @pytest.mark.parametrize("seconds", [0.0, 1.0])
@@ -270,6 +270,7 @@ def test_lines_come_while_a_part_says_nothing_and_its_time_left_never_grows() ->
     assert set(left) == {"1 s"}  # of the 0.8 s that the other eight take
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminal to give a process there")
 def test_on_a_terminal_it_is_a_bar_that_goes_when_the_work_is_done() -> None:
     import pty

@@ -220,7 +220,7 @@ def of_kind(kind: str) -> Replay:
     return replay(plain, simulate(plain, "tracking", seed=2, duration=1.5), "log")
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mesh", "arm", *MACHINES])
 def test_each_body_of_the_page_is_where_mujoco_has_it(kind, chrome, tmp_path) -> None:
     what = of_kind(kind)

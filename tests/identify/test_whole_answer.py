@@ -44,7 +44,7 @@ def beyond(found: AxisDiagnosis) -> set[str]:
     return {n for n in final.names if n not in base.names} | freed
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HELD)
 def test_every_law_of_the_final_model_belongs_to_a_finding(name: str) -> None:
     logs = [{f"{i}": logged(HELD[name], Ride(i))} for i in (1, 2, 3)]
@@ -138,6 +138,7 @@ def test_the_next_command_is_done_once_the_model_is_written(drive: Path, answer:
     assert "Missing:" not in done
 
 
+@pytest.mark.slow
 def test_a_model_keeps_the_length_that_its_errors_were_told_at(drive: Path, tmp_path: Path) -> None:
     """Beside it every command tells them, where the samples of the logs allow that length."""
     axis = replace(machine(16.0, cogging=COGGING), test_function=0.05)

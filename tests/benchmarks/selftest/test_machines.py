@@ -82,7 +82,7 @@ def test_a_machine_is_logged_for_training_selection_and_test():
     assert 0.0 < abs(empty.true.axes["x"].mass / STAGE.axes["x"].mass - 1.0) < 0.1
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("strength", [2.0, 6.0])
 def test_an_effect_has_the_strength_that_was_asked_beyond_what_the_model_takes_over(strength):
     """In noise floors, which are what the machine's own laws leave."""

@@ -340,6 +340,7 @@ def test_bodies_are_the_same_in_pieces_of_time_as_at_once():
         np.testing.assert_array_equal(own.during(slice(70, 5000)).speeds, speed[:, 70:5000])
 
 
+@pytest.mark.slow
 def test_a_fit_of_joints_holds_little_beside_their_log_and_its_signals_come_back():
     size = sum(axis.columns[n].nbytes for axis in LOG.axes.values() for n in ("position", "force"))
     fit(MODEL, {"1": LOG})  # loads what is compiled

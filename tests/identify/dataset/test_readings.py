@@ -59,6 +59,7 @@ FEW = Catalogue(
 )
 
 
+@pytest.mark.slow
 def test_it_is_not_named_where_other_noise_is_larger():
     fine = dataset_of(0.0)
     found = diagnose_axis(fit_axis(STAGE.axes["x"], fine.training), fine, FEW)

@@ -342,6 +342,7 @@ def dataset():
     return dataset_of(*logs[:2], holdout=(logs[2],))
 
 
+@pytest.mark.slow
 def test_a_log_begun_later_has_its_clock_later_modulo_the_period(dataset):
     axis = STAGE.with_effect(REST)
     wanted = np.mod(LATE * 23.7 + 0.5, 1.0) - 0.5

@@ -55,6 +55,7 @@ def prepared(model: MachineModel, log: Log) -> tuple[PreparedLog, ...]:
     return datasets(model, {"log": log}, {}, 0.1)["x"].training
 
 
+@pytest.mark.slow
 def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:
     axis, where = slide.axes["x"], free_parameters(slide.axes["x"])
     found = fit_simulated_motion(write(axis, where, 1.1 * read(axis, where)), prepared(slide, log))

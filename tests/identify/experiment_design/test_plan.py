@@ -240,6 +240,7 @@ def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
 TURNED = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5)  # rad
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(("noise", "scale"), [(1e-6, 6.8 / 0.34), (1e-4, 50.0 * 1e-4 / 2e-5)])
 def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     """The lengths of a linear stage, taken for rad, were lost in the noise of a rotary axis."""
@@ -266,6 +267,7 @@ def test_a_slow_axis_is_mapped_as_fast_as_it_can_and_a_weak_motor_moves_gently()
     assert efforts == {0.2, 0.1}  # a fifth of what the limits allow, and half of it under a sweep
 
 
+@pytest.mark.short(2)
 @pytest.mark.parametrize("name", STAGES)
 def test_every_proposal_stays_within_the_limits_of_the_stage(name):
     stage = STAGES[name]
@@ -474,6 +476,7 @@ def test_what_hardly_moves_or_is_too_slow_has_no_record():
         arena(FIRST).record(FIRST, resting)
 
 
+@pytest.mark.slow
 def test_trials_come_by_falling_gain_and_a_refit_judges_by_the_truth_told_worst():
     tried, bars = [Tracking(2.0), Tracking(0.4), Tracking(4.0)], []
     every, not_run = contest(arena(FIRST, SECOND), tried, lambda *done: bars.append(done[1:]))

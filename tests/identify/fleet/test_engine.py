@@ -81,6 +81,7 @@ def test_what_is_not_installed_is_told_with_how_to_get_it() -> None:
         needed("duckdb")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(tmp_path) -> None:
     pytest.importorskip("distributed")
     with (

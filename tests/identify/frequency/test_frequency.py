@@ -62,6 +62,7 @@ def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float)
     assert mode.gain.value == pytest.approx(machine.load / machine.motor, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_not() -> None:
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
     records = [recorded(wandering, noisy, seed) for seed in range(3)]
@@ -218,6 +219,7 @@ def log(elastic: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> Path
     return path
 
 
+@pytest.mark.slow
 def test_twin_and_model_show_what_was_planted_in_spite_of_friction(
     elastic: MachineModel, log: Path
 ) -> None:
@@ -232,6 +234,7 @@ def test_twin_and_model_show_what_was_planted_in_spite_of_friction(
         assert shown.plant.delay.value == pytest.approx(1.3e-3, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     table, picture = tmp_path / "r.csv", tmp_path / "bode.png"
     done = twin("frf", log, "-o", table, "--plot", picture, folder=tmp_path)
@@ -275,6 +278,7 @@ def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
         identify.frequency_response(path)
 
 
+@pytest.mark.slow
 def test_a_response_is_python_controls_frd() -> None:
     control = pytest.importorskip("control")
     record = recorded(wandering)

@@ -84,6 +84,7 @@ def test_every_section_is_there(page: str) -> None:
     assert re.findall(r'<a href="#(\w+)">', page) == expected
 
 
+@pytest.mark.slow
 def test_what_feedforward_gains_is_known_where_something_was_found(case: Case) -> None:
     before, after = case.diagnosis.fitted, case.diagnosis.model
     worth = on_machine(after, case.held, before).worth
@@ -106,6 +107,7 @@ def test_what_the_logs_do_not_tell_is_left_out_of_a_page_with_the_reason(
     assert "Left out is the frequency response: axis x: the log has no setpoint_position" in text
 
 
+@pytest.mark.slow
 def test_the_response_of_the_page_is_that_of_the_command_and_says_of_which_logs(
     case: Case, tmp_path: Path
 ) -> None:

@@ -216,6 +216,7 @@ def test_five_logs_of_a_million_and_a_half_samples(case: Case, tmp_path: Path) -
     assert min(paints) < 1.0
 
 
+@pytest.mark.slow
 def test_a_spike_is_beyond_the_range_on_which_the_charts_open(
     shown: tuple[Browser, Path], tmp_path: Path
 ) -> None:

@@ -50,7 +50,7 @@ def test_what_does_not_slip_within_the_travel_is_a_spring(known):
     assert all(refused[name].endswith("so that it is a spring here") for name in sticking)
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imitator", "mass", "gain", "told"),
     [
@@ -73,6 +73,7 @@ def test_a_gain_and_an_inertia_are_no_limit_and_no_frame(imitator, mass, gain, t
 LIMIT, WIDTH, LAG = 3.0, 2.0, 4e-3  # N: a fifth of the commands are beyond, a tenth of the largest
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("name", "value", "command"),
     [
@@ -87,6 +88,7 @@ def test_a_law_of_the_actuation_is_found_where_the_motion_passes_its_knee(name, 
     assert found.fit.axis[name].vector()[0] == pytest.approx(value, rel=0.1)
 
 
+@pytest.mark.short(2)
 @pytest.mark.parametrize(
     ("law", "values"),
     [("actuator_saturation", {"limit": 5.0, "loss": 0.5}), ("actuator_deadband", {"width": 0.3}),

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 # 1. A control that is the candidate itself.
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.01, 0.3])
 def test_an_offset_far_above_the_noise_is_named(size: float) -> None:
     """A constant shifted in time is the constant: as its own control it was never proved."""
@@ -75,7 +75,7 @@ def in_units(name: str, force: float, place: float) -> AxisDiagnosis:
     return diagnose_axis(*begun(base, {"one": one, "two": two}, {"held": held}), RIVALS)
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("force", "place"), UNITS)
 @pytest.mark.parametrize("name", IN_UNITS)
 def test_the_answer_is_the_same_in_other_units(name: str, force: float, place: float) -> None:
@@ -155,6 +155,7 @@ def test_stops_are_found_where_the_logs_end_whatever_the_travel_of_the_model() -
     assert found.final.axis["end_stop"].values["low"] == pytest.approx(-0.054, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     """That the noise floor rises is no change of the model: each form had unpacked its findings."""
     one, two, held = (with_hum(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
@@ -179,7 +180,7 @@ def test_rounding_is_named_beside_noise_that_no_sensor_makes() -> None:
     assert found.named == ("encoder_quantization",)
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [-0.4, 0.4])
 def test_a_friction_that_would_need_more_asymmetry_than_there_is_is_never_named(
     size: float,
@@ -301,6 +302,7 @@ def test_bumps_of_another_form_alone_are_no_other_effect(
     assert bool(found.findings) is (size > 1.0)
 
 
+@pytest.mark.slow
 def test_a_lone_bump_is_no_cogging() -> None:
     def bump(x: Array, v: Array) -> Array:
         return 0.06 * np.exp(-4.0 * np.log(2.0) * ((x - 0.011) / 0.004) ** 2)

@@ -171,6 +171,7 @@ def test_a_hard_current_limit_is_named_with_all_of_the_force_above_it_lost():
     assert finding.parameters["limit"] == pytest.approx(0.8 * most, rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_effect_stands_without_a_strength_that_ended_at_its_bound():
     """Viscous friction that differs by more than the law allows, beside dry friction that does."""
 
@@ -257,7 +258,7 @@ def test_a_law_of_any_machine_is_found_with_its_values(name: str) -> None:
         assert found.fit.axis[name].values[key] == pytest.approx(value, rel=0.05, abs=0.02)
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "values"),
     [

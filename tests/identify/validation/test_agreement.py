@@ -113,6 +113,7 @@ def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) ->
         assert_agree(path, PROTON, catalogue=FEW)
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_1_where_the_fits_differ(tmp_path: Path) -> None:
     save_model(fitted(), tmp_path / "a.toml")
     save_model(fitted(mass=12.0), tmp_path / "c.toml")

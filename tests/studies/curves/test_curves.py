@@ -260,6 +260,7 @@ def test_no_force_is_told_beyond_a_spike_at_the_end_and_its_band_holds_the_truth
     assert 0.75 < np.mean(np.abs(found.force - true) < found.band) < 0.99
 
 
+@pytest.mark.slow
 def test_passes_of_a_machine_give_its_cable_and_its_pitch() -> None:
     passes = kinds.Passes("x", span=0.3, speed=0.1, repeats=2)
     log = simulate(STAGE, passes, seed=1, simulator=ReducedSimulator)

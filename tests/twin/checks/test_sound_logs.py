@@ -29,11 +29,13 @@ def test_tracking_is_clean(seed: int) -> None:
     assert check_log(simulate(stage(), "tracking", seed=seed, duration=10.0)).findings == ()
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("experiment", ["moves", "open_loop_sine"])
 def test_experiments_of_both_axes_are_clean(experiment: str) -> None:
     assert check_log(simulate(stage(), experiment, seed=1, duration=10.0)).findings == ()
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("experiment", ["cable_pass", "reversals"])
 def test_experiments_of_one_axis_have_no_errors(experiment: str) -> None:
     report = check_log(simulate(stage(), experiment, duration=10.0))

@@ -168,6 +168,7 @@ def test_the_example_and_an_effect_of_the_catalogue_obey(tmp_path: Path) -> None
         assert len(lines) == len(LAWS) - 1  # a force takes no energy as friction must
 
 
+@pytest.mark.slow
 def test_json_is_one_object_of_every_file(tmp_path: Path) -> None:
     good, bad = written(tmp_path, "mine"), written(tmp_path, "bad", *BROKEN["never acts"][:2])
     command = ("effects", "--effects", good, "--effects", bad, "--check", "--json")

@@ -280,6 +280,7 @@ def test_a_file_cut_off_keeps_every_chunk_before_the_cut(tmp_path, intact):
         assert bool(told) == (cut not in ends)
 
 
+@pytest.mark.slow
 def test_a_bit_flipped_in_any_kind_of_record_is_told_and_costs_its_chunk_at_most(tmp_path, intact):
     """The opcode, bytes of the length and of the content, of a record of each kind; the magic."""
     first_of = {r.opcode: r for r in reversed(intact.records)}
@@ -353,6 +354,7 @@ def test_what_no_checksum_proves_comes_back_only_on_request(tmp_path, intact):
     assert f"chunk at byte {chunk.start}: has no checksum" in "; ".join(recovery.unproved)
 
 
+@pytest.mark.slow
 def test_every_cut_and_every_flipped_bit_is_refused(tmp_path, intact):
     data, path, rng = intact.data, tmp_path / "a.mcap", np.random.default_rng(1)
     first, end = intact.chunks[0].start, intact.chunks[-1].end

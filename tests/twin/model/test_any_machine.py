@@ -131,6 +131,7 @@ def test_the_log_states_its_units_and_is_fit(gone_round: Round) -> None:
         assert (units["position"], units["force"]) == (axis.units.position, axis.units.force)
 
 
+@pytest.mark.short(1)
 def test_the_hidden_effect_is_named_and_added(gone_round: Round) -> None:
     hidden = gone_round.truth.axes[gone_round.axis].names[-1]
     assert gone_round.found.effect is not None

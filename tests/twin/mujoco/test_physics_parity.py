@@ -71,6 +71,7 @@ def test_both_simulations_agree_with_every_effect_and_it_acts(effect: Effect, pl
     assert changed > 1e-6 * np.abs(command).max(), "the stage moves as without the effect"
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize("experiment", ["tracking", pytest.param("moves", marks=pytest.mark.slow)])
 def test_both_simulations_agree_with_all_effects_on_both_axes(experiment: str) -> None:
     require_parity(with_all(STAGE, np.random.default_rng(22)), experiment)
