@@ -24,6 +24,7 @@ from twin.errors import InputError
 from twin.signals import Array
 
 SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
+TINY = np.finfo(float).tiny
 LOUD = 3.0  # standard deviations from which an error counts less: what is not linear has peaks
 DAMPING = (1e-4, 0.005, 0.05, 0.3)  # of a mode: least, two at which it is sought, and most
 
@@ -173,16 +174,13 @@ def _solved(told: Response, start: Array) -> _Solved:
 
     modes = (len(start) - 4) // 3
 
-    def left(values: Array) -> Array:
-        error = _left(values, told)
-        return np.concatenate([error.real, error.imag]) * np.sqrt(2.0)
-
     omega = np.log(2.0 * np.pi * told.frequency[[0, -1]])
     low = [start[0] - 7.0, -20.0, -20.0, -100.0] + [omega[0], np.log(DAMPING[0]), -np.inf] * modes
     high = [start[0] + 7.0, 20.0, 40.0, 100.0] + [omega[1], np.log(DAMPING[-1]), np.inf] * modes
     done = least_squares(
-        left, np.clip(start, low, high), bounds=(low, high), x_scale="jac", loss="soft_l1",
-        f_scale=LOUD, max_nfev=200, ftol=1e-6, xtol=1e-6,
+        lambda v: _left(v, told), np.clip(start, low, high),
+        lambda v: _slopes(v, np.array(low), np.array(high), told), bounds=(low, high),
+        x_scale="jac", loss="soft_l1", f_scale=LOUD, max_nfev=200, ftol=1e-6, xtol=1e-6,
     )  # fmt: skip
     covariance = _covariance(done.jac, done.fun)
     # What ends at a bound is not told, nor what may change by a factor e and leaves all as it is.
@@ -215,65 +213,92 @@ def _with_mode(told: Response, best: _Solved) -> list[Array]:
     for values in (best.values, np.concatenate([_without_modes(told)[0], best.values[4:]])):
         mass, late = float(np.exp(values[0])), values[3] * told.period
         rest, aim = _sampled(values, told) / told.spread, told.plant / told.spread
-        tried = []
-        for omega in 2.0 * np.pi * told.frequency[2:-2]:
-            for damping in DAMPING[1:-1]:
-                roots = _roots(2.0 * damping * omega, omega**2)
-                both = np.stack([rest, _held(roots, 1.0 / mass, late, told) / told.spread])
-                met = (both.conj() @ aim).real
-                scale = np.linalg.lstsq((both.conj() @ both.T).real, met, rcond=None)[0]
-                if scale[0] > 0.0:
-                    tried.append((float(scale @ met), omega, damping, *scale))
-        if tried:
-            _, omega, damping, rest_times, gain = max(tried)
-            more = [np.log(omega), np.log(damping), gain / rest_times]
+        omega, damping = np.meshgrid(2.0 * np.pi * told.frequency[2:-2], DAMPING[1:-1])
+        roots = _roots((2.0 * damping * omega).ravel(), (omega**2).ravel())
+        mode = _held(roots, late, told) / mass / told.spread
+        scale, taken = _scaled(rest, mode, aim)
+        taken[scale[0] <= 0.0] = -np.inf
+        if np.isfinite(taken[largest := int(np.argmax(taken))]):
+            rest_times, gain = scale[:, largest]
+            shape = [np.log(omega.flat[largest]), np.log(damping.flat[largest])]
+            more = [*shape, gain / rest_times]
             starts.append(np.array([values[0] - np.log(rest_times), *values[1:], *more]))
     return starts
 
 
-def _left(values: Array, told: Response) -> Complex:
-    """What these values leave of the response (k,), in its standard deviations."""
-    return np.asarray((_sampled(values, told) - told.plant) / told.spread)
+def _scaled(rest: Complex, modes: Complex, aim: Complex) -> tuple[Array, Array]:
+    """Numbers (2, m) times the rest (k,) and times each of some modes (m, k) that leave least.
+
+    And what they take of the aim's (k,) squares (m,).
+    """
+    square = float(np.vdot(rest, rest).real)
+    across, modes_square = (modes @ rest.conj()).real, np.sum(np.abs(modes) ** 2, axis=1)
+    met, modes_met = float(np.vdot(rest, aim).real), (modes.conj() @ aim).real
+    whole = np.maximum(square * modes_square - across**2, TINY)
+    first = (modes_square * met - across * modes_met) / whole
+    second = (square * modes_met - across * met) / whole
+    return np.stack([first, second]), first * met + second * modes_met
+
+
+def _left(values: Array, told: Response) -> Array:
+    """What values (n, ...) leave of the response (2 k, ...), in its standard deviations."""
+    left = ((_sampled(values, told).T - told.plant) / told.spread).T
+    return np.concatenate([left.real, left.imag]) * np.sqrt(2.0)
+
+
+def _slopes(values: Array, low: Array, high: Array, told: Response) -> Array:
+    """Derivatives (2 k, n) of what values (n,) leave, within their bounds, by differences."""
+    step = np.sqrt(np.finfo(float).eps) * np.maximum(1.0, np.abs(values))
+    step = np.where(values + step > high, -step, step)
+    every = _left(np.column_stack([values, values[:, None] + np.diag(step)]), told)
+    return (every[:, 1:] - every[:, :1]) / step
 
 
 def _sampled(values: Array, told: Response) -> Complex:
-    """Response (k,) of the samples of a plant with these values."""
-    mass, damping, stiffness = np.exp(values[[0, 1, 2]])
-    terms = [(_roots(damping, stiffness), 1.0 / mass)]
-    for log_omega, log_ratio, gain in values[4:].reshape(-1, 3):
-        omega, ratio = np.exp(log_omega), np.exp(log_ratio)
-        terms.append((_roots(2.0 * ratio * omega, omega**2), gain / mass))
-    late = values[3] * told.period
-    return np.asarray(sum(_held(roots, gain, late, told) for roots, gain in terms))
+    """Response (k, ...) of the samples of a plant with these values (n, ...)."""
+    mass, damping, stiffness = np.exp(values[:3])
+    omega, ratio = np.exp(values[4::3]), np.exp(values[5::3])
+    roots = _roots(
+        np.concatenate([damping[None], 2.0 * ratio * omega]),
+        np.concatenate([stiffness[None], omega**2]),
+    )
+    gain = np.concatenate([np.ones_like(mass)[None], values[6::3]]) / mass
+    return np.sum(gain[:, None] * _held(roots, values[3] * told.period, told), axis=0)
 
 
-def _roots(linear: float, constant: float) -> tuple[complex, complex]:
-    """The roots of s^2 + linear s + constant, never the same, as each has a state of its own."""
-    half = 0.5 * linear
-    apart = np.sqrt(complex(half**2 - constant))
-    apart = apart if abs(apart) > 1e-6 * (half + 1e-9) else complex(1e-6 * (half + 1e-9))
-    far = -half - apart
-    return far, (constant / far if abs(apart.imag) == 0.0 else -half + apart)
+def _roots(linear: Array, constant: Array) -> tuple[Complex, Complex]:
+    """The roots (m, ...) of s^2 + linear s + constant, never the same: each has its own state."""
+    half, least = 0.5 * linear, 1e-6 * (0.5 * linear + 1e-9)
+    apart: Complex = np.sqrt((half**2 - constant).astype(complex))
+    apart = np.where(np.abs(apart) > least, apart, least)
+    far: Complex = -half - apart
+    return far, np.where(apart.imag == 0.0, constant / far, -half + apart)
 
 
-def _held(roots: Sequence[complex], gain: float, late: float, told: Response) -> Complex:
-    """Response (k,) of gain/((s - p) (s - q)) to a command held over samples and late by s."""
-    period, turn = told.period, 2j * np.pi * told.frequency * told.period
+def _held(roots: tuple[Complex, Complex], late: Array, told: Response) -> Complex:
+    """Responses (m, k, ...) of 1/((s - p) (s - q)), of roots (m, ...) p and q.
+
+    To a command that is held over samples, and late (...) by s.
+    """
+    period, late = told.period, np.asarray(late)
+    turn = (2j * np.pi * told.frequency * period).reshape(-1, *[1] * late.ndim)
     whole = np.floor(late / period)
-    part = late - whole * period
-    out = np.zeros(len(told.frequency), dtype=complex)
+    part, once, back = late - whole * period, np.exp(turn), np.exp(-turn)
+    out = np.zeros((), dtype=complex)
     for own, other in (roots, roots[::-1]):
         before = np.exp(own * (period - part)) * _grown(own, part)  # by the command before
-        now = _grown(own, period - part)
-        drive = before * np.exp(-turn) + now
-        out += gain / (own - other) * drive / (np.exp(turn) - np.exp(own * period))
-    return out * np.exp(-whole * turn)
+        drive = before[:, None] * back + _grown(own, period - part)[:, None]
+        ahead = (own - other)[:, None] * (once - np.exp(own * period)[:, None])
+        out = out + drive / ahead
+    return out * np.exp(-turn * whole)
 
 
-def _grown(pole: complex, time: float) -> complex:
+def _grown(pole: Complex, time: Array) -> Complex:
     """(exp(p t) - 1)/p, s."""
     x = pole * time
-    return time * (1.0 + 0.5 * x + x * x / 6.0) if abs(x) < 1e-5 else np.expm1(x) / pole
+    small = np.abs(x) < 1e-5
+    series = time * (1.0 + 0.5 * x + x * x / 6.0)
+    return np.where(small, series, np.expm1(x) / np.where(small, 1.0, pole))
 
 
 def _read(found: Response, told: Response, best: _Solved) -> Plant:
