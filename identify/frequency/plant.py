@@ -268,10 +268,10 @@ def _sampled(values: Array, told: Response) -> Complex:
 
 def _roots(linear: Array, constant: Array) -> tuple[Complex, Complex]:
     """The roots (m, ...) of s^2 + linear s + constant, never the same: each has its own state."""
-    half, least = 0.5 * linear.astype(complex), 1e-6 * (0.5 * linear + 1e-9)
-    apart = np.sqrt(half**2 - constant)
+    half, least = 0.5 * linear, 1e-6 * (0.5 * linear + 1e-9)
+    apart = np.sqrt(np.asarray(half**2 - constant, dtype=complex))
     apart = np.where(np.abs(apart) > least, apart, least)
-    far = -half - apart
+    far = np.asarray(-half - apart, dtype=complex)
     return far, np.where(apart.imag == 0.0, constant / far, -half + apart)
 
 
