@@ -103,6 +103,7 @@ def typed(folder: Path, arguments: list[str], answers: list[str]) -> tuple[str, 
     return said.decode().replace("\r", ""), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no terminal to be had there")
 def test_on_a_terminal_it_asks_for_what_is_not_known(tmp_path):
     written(tmp_path, "t,pos,torque [%]", 1e3 * X, F)

@@ -34,6 +34,7 @@ def rotary(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_ranges_are_those_of_the_whole_log_however_long(tmp_path, monkeypatch) -> None:
     path = tmp_path / "long.mcap"
     write_log(twin.simulate(twin.load_model("proton_xy"), "tracking", seed=1, duration=3.0), path)

@@ -182,6 +182,7 @@ def test_a_joint_of_another_sign_or_place_is_told(folder, change, said):
     assert told is None if said is None else told is not None and said in told.said
 
 
+@pytest.mark.slow
 def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder):
     model = load_model(folder / "arm.toml")
     less = model.with_axis("shoulder", model.axes["shoulder"].without("coulomb_viscous"))

@@ -47,6 +47,7 @@ def test_a_package_offers_ten_to_forty_names_and_lists_them(package) -> None:
         _ = package.nothing
 
 
+@pytest.mark.slow
 def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, file) -> None:
     assert list(identify.first_model(log).axes) == list(log.axes)
     given = [log, file, str(file), [log], (file,), {"a": log}, {"a": file}]

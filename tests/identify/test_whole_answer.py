@@ -89,6 +89,7 @@ def errors_of(model: Path, folder: Path) -> tuple[float, float]:
     return again.fits["x"].error, again.test_error["x"]
 
 
+@pytest.mark.slow
 def test_the_model_that_is_written_leaves_the_error_that_was_told(drive: Path, answer: dict):
     told = answer["force_error_with_found"], answer["test_error_after"]
     assert answer["test_error_after"] < 0.05 * answer["test_error_before"]

@@ -81,6 +81,7 @@ def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     assert blind.high > knowing.value
 
 
+@pytest.mark.slow
 def test_rounding_at_even_speed_is_no_aliasing():
     """A tone of rounding beside another looks like the dip of a thinned log; below it is quiet."""
     stage = STAGE

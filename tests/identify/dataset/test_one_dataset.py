@@ -132,6 +132,7 @@ def test_a_restart_knows_the_other_axis_acceleration(simulator, name, values):
     assert np.sqrt(np.nanmean(found**2)) < 3.0 * np.sqrt(np.nanmean(bare**2))
 
 
+@pytest.mark.slow
 def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
     lacking = STAGE.with_axis("x", STAGE.axes["x"].without("roller_spikes"))
     for seed in (2, 3):
@@ -409,6 +410,7 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
 
 
+@pytest.mark.slow
 def test_held_out_logs_that_share_little_test_all_the_same() -> None:
     assert dataset_of(0.2).beyond == {}
     assert set(dataset_of(0.2, 0.0).beyond) == {"held 0"}  # together they share half

@@ -248,6 +248,7 @@ def test_a_line_of_several_logs_is_told_once_and_a_near_one_apart():
     assert len(lines_in_time(many)) == MOST_LINES
 
 
+@pytest.mark.short(1)
 @pytest.mark.parametrize(("records", "pole"), [(1, 0.95), (3, 0.0)])
 def test_noise_of_any_colour_shows_a_line_as_rarely_as_is_said(records, pole):
     """In 100 trials at 10 %: at most 20, which one in a thousand such draws exceeds."""

@@ -57,6 +57,7 @@ def test_a_value_that_fits_as_well_farther_off_has_no_interval():
     assert found["end_stop.high"].low <= highest <= found["end_stop.high"].high
 
 
+@pytest.mark.slow
 def test_a_users_effect_is_fitted_and_named():
     own = load_catalogue([Path(__file__).parents[3] / "examples" / "my_effect.py"])
     true = {"k": 9.0, "place": 0.043, "w": 0.018}

@@ -108,6 +108,7 @@ def differing(effect: Effect, length: float, force: float) -> list[str]:
     return out
 
 
+@pytest.mark.short(12)
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
 def test_a_fit_is_the_same_in_other_units(effect: Effect) -> None:
     units = [(1.0 if effect.name in TURNING else u[0], u[1]) for u in UNITS]  # a radian is one

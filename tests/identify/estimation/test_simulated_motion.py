@@ -65,6 +65,7 @@ def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:
     assert len(found.starts) == 4
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_in_motion_is_begun_as_it_was(slide, log) -> None:
     columns = {name: column[700:] for name, column in log.axes["x"].columns.items()}
     late = Log(RATE, {"x": AxisLog(columns)})

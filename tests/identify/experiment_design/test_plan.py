@@ -175,6 +175,7 @@ def test_what_no_motion_tells_apart_is_said():
     assert "not decided" in plan_text(found)
 
 
+@pytest.mark.slow
 def test_without_rivals_the_experiment_says_most_about_the_model():
     stage = stage_of()
     with pytest.raises(InputError, match="different"):
@@ -222,6 +223,7 @@ def test_a_neat_value_has_three_digits_and_is_no_larger(value):
     assert float(f"{found:.3g}") == neat(found) == found
 
 
+@pytest.mark.slow
 def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
     found, _ = proposals(STAGE, "x", 8.0)
     assert {Tracking, Moves, Passes, Staircase, Steps, Sweep} <= {type(e) for e in found}
@@ -504,6 +506,7 @@ def test_trials_come_by_falling_gain_and_a_refit_judges_by_the_truth_told_worst(
 LOG = windowed(SHORT)
 
 
+@pytest.mark.slow
 def test_a_plan_leaves_out_logs_that_refute_a_rival():
     """They would decide whatever the experiment is; a refit of the new log takes the mass over."""
     rivals = Explanation("good", PLAIN), Explanation("bad", replace(PLAIN, mass=6.0))

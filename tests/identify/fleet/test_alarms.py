@@ -30,7 +30,7 @@ def test_machines_that_are_well_raise_none() -> None:
         assert alarms_of([panel(nights(seed, count=300))]) == ()
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "within"), [(0.1, 5), (0.03, 30)])
 def test_a_change_is_told_within_its_nights_with_date_and_size(share, within) -> None:
     for seed in range(5):

@@ -102,6 +102,7 @@ def test_the_margins_are_those_of_the_loop() -> None:
     assert told.phase_margin == pytest.approx(np.angle(-exact[falls]), abs=0.1)
 
 
+@pytest.mark.slow
 def test_where_the_setpoint_makes_none_of_the_force_nothing_is_told() -> None:
     """There the ratio is that of noise, which feedback makes: as sure as it is wrong."""
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
@@ -127,6 +128,7 @@ sigma2 = 8.0
 """
 
 
+@pytest.mark.slow
 def test_no_mass_is_read_off_where_not_even_that_of_the_model_comes_back(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(RUBBING)
     model = load_model(tmp_path / "m.toml")

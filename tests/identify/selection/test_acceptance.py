@@ -304,6 +304,7 @@ def beside(control: float) -> float:
     return CLEARLY * (1.0 - control)
 
 
+@pytest.mark.short(10)
 @pytest.mark.parametrize("effect", OTHERS, ids=lambda e: e.name)
 def test_what_is_planted_passes_and_its_control_leaves_clearly_more(effect: Effect) -> None:
     found = planted(effect)
@@ -311,6 +312,7 @@ def test_what_is_planted_passes_and_its_control_leaves_clearly_more(effect: Effe
     assert 1.0 - found.part < beside(found.control)
 
 
+@pytest.mark.short(10)
 @pytest.mark.parametrize("effect", OTHERS, ids=lambda e: e.name)
 def test_of_noise_an_effect_takes_next_to_nothing(effect: Effect) -> None:
     found = planted(effect, 0.0)

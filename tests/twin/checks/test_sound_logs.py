@@ -29,7 +29,7 @@ def test_tracking_is_clean(seed: int) -> None:
     assert check_log(simulate(stage(), "tracking", seed=seed, duration=10.0)).findings == ()
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", ["moves", "open_loop_sine"])
 def test_experiments_of_both_axes_are_clean(experiment: str) -> None:
     assert check_log(simulate(stage(), experiment, seed=1, duration=10.0)).findings == ()

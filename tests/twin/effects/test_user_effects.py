@@ -141,6 +141,7 @@ def written(folder: Path, name: str, good: str = "", bad: str = "") -> Path:
     return path
 
 
+@pytest.mark.short(2)
 @pytest.mark.parametrize("fault", BROKEN)
 def test_a_broken_law_is_said_in_one_line(fault: str, tmp_path: Path) -> None:
     """Where it reads what it has not, nothing else is tried: compiled, it would read anywhere."""

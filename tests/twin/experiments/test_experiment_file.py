@@ -177,6 +177,7 @@ def test_a_force_has_a_column_of_its_own(tmp_path):
     assert "y force [N]" not in table
 
 
+@pytest.mark.slow
 def test_a_long_table_is_written_in_parts_without_a_gap(tmp_path):
     write_setpoints(Moves(400, duration=11.0), PROTON, 1, tmp_path / "s.csv")
     time = np.loadtxt(tmp_path / "s.csv", delimiter=",", skiprows=1, usecols=0)

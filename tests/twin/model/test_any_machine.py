@@ -120,7 +120,7 @@ def texts(r: Round) -> str:
     return "\n".join(shown)
 
 
-@pytest.mark.short(1)
+@pytest.mark.slow
 def test_the_log_states_its_units_and_is_fit(gone_round: Round) -> None:
     log = gone_round.logs["log 1"]
     assert check_log(log).ok
