@@ -162,7 +162,9 @@ def test_jobs_run_one_after_the_other_and_what_they_say_stays(jobs):
 
 
 def test_a_job_that_is_killed_or_stopped_is_told_and_the_next_one_runs(jobs):
-    wait = "import time; print('begun', flush=True); time.sleep(60)"
+    # As `twin` does: what a shell runs in the background is begun with the signal ignored.
+    heeds = "import signal as s; s.signal(s.SIGINT, s.default_int_handler)"
+    wait = f"{heeds}; import time; print('begun', flush=True); time.sleep(60)"
     killed, stopped, left, last = (jobs.add([text]) for text in (wait, wait, wait, "print(1)"))
     jobs.stop(left.number)
     os.kill(begun(jobs, killed.number), signal.SIGKILL)
