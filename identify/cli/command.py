@@ -280,8 +280,13 @@ def progress_on_stderr(first: float = FIRST, every: float = EVERY) -> Iterator[P
         yield silent
         return
     shown = Shown()
-    with _bar(shown) if sys.stderr.isatty() else _lines(shown, sys.stderr, first, every):
-        yield shown
+    try:
+        with _bar(shown) if sys.stderr.isatty() else _lines(shown, sys.stderr, first, every):
+            yield shown
+    except SystemExit:  # by a signal: what is known by then was worth the wait
+        if shown.ahead:
+            print(f"twin: stopped{shown.ahead}; nothing of it is proved yet", file=sys.stderr)
+        raise
 
 
 @contextmanager

@@ -18,10 +18,10 @@ import pytest
 from planted_logs import SLIDE, Ride, begun, few, having, logged
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from identify.cli.command import Progressed, roughly
+from identify.cli.command import Progressed, progress_on_stderr, roughly
 from identify.selection.diagnosis import diagnose_axis
 from twin.logs import AxisLog, Log, write_log
-from twin.parallel import within
+from twin.parallel import AHEAD, within
 from twin.threads import VARIABLES, one_for_matrices
 
 SLOW_PARTS = ("signal", "stats", "special", "optimize", "ndimage", "fft")
@@ -168,6 +168,16 @@ def test_a_signal_is_one_line(
     out, err = run.communicate()
     assert (run.returncode, out, err) == (code, "", f"twin: {word}\n")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("shares", ["cogging 80 %, spring 2 %", ""])
+def test_what_is_known_when_a_command_is_stopped_is_told(shares: str, capsys) -> None:
+    with pytest.raises(SystemExit), progress_on_stderr() as progress:
+        if shares:
+            progress(f"{AHEAD}{shares}", 0, 0)
+        raise SystemExit(128 + signal.SIGINT)
+    told = f"twin: stopped; ahead: {shares}; nothing of it is proved yet\n"
+    assert capsys.readouterr().err == (told if shares else "")
 
 
 DEAF = """

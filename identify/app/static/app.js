@@ -72,7 +72,7 @@ function ended(job) {
   if (job.state === "killed") return h("div", { class: "bad" }, h("span", {}, h("b", {}, job.command),
     " was killed; nothing of it is half written. Run it again."));
   if (job.state === "stopped") return h("div", { class: "bad" }, h("span", {}, h("b", {}, job.command),
-    " was stopped; the project is as it was before."));
+    " was stopped; the project is as it was before. ", job.remarks.find(r => r.startsWith("stopped; "))?.slice(9) ?? ""));
   if (job.code === 0) return h("div", { class: "good" }, h("span", {}, h("b", {}, job.command), ` done, ${took}`),
     said(job));
   return h("div", { class: "bad" }, h("span", {}, h("b", {}, job.command), " ", why), said(job));
