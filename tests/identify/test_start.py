@@ -172,10 +172,14 @@ def test_a_signal_is_one_line(
 
 @pytest.mark.parametrize("shares", ["cogging 80 %, spring 2 %", ""])
 def test_what_is_known_when_a_command_is_stopped_is_told(shares: str, capsys) -> None:
-    with pytest.raises(SystemExit), progress_on_stderr() as progress:
-        if shares:
-            progress(f"{AHEAD}{shares}", 0, 0)
-        raise SystemExit(128 + signal.SIGINT)
+    def stopped() -> None:
+        with progress_on_stderr() as progress:
+            if shares:
+                progress(f"{AHEAD}{shares}", 0, 0)
+            raise SystemExit(128 + signal.SIGINT)
+
+    with pytest.raises(SystemExit):
+        stopped()
     told = f"twin: stopped; ahead: {shares}; nothing of it is proved yet\n"
     assert capsys.readouterr().err == (told if shares else "")
 
