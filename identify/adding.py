@@ -19,6 +19,7 @@ from identify.results.results import (
     AllAdded,
     CorrectedBody,
     addition,
+    step_of_body,
     steps_together,
 )
 from identify.selection.acceptance import Judged, score
@@ -31,7 +32,7 @@ from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.logs import GivenLogs
 from twin.model.file import as_model
-from twin.model.machine import AxisModel
+from twin.model.machine import AxisModel, HistoryStep, MachineModel
 from twin.parallel import Progress, parallel, silent
 
 
@@ -131,7 +132,28 @@ def add_found(
             made = made.with_history(*steps_together(names, first, last, dataset))
             gain = score(Judged(first, dataset), Judged(last, dataset))
             kept = kept and gain.accepted
+    for body, axes in _other_bodies(given, with_all).items():
+        for axis in (a for a in axes if a in after.fits and a in before.fits):
+            step = step_of_body(body, axis, before, after)
+            made, kept = made.with_history(step), kept and _is_less_after(step)
     return AllAdded(made, before, made.history[len(given.history) :], kept)
+
+
+def _is_less_after(step: HistoryStep) -> bool:
+    """Whether the error is less with a step, on logs that were not fitted where there are any."""
+    if step.holdout_error_before is not None and step.holdout_error_after is not None:
+        return step.holdout_error_after < step.holdout_error_before
+    return step.fit_error_after < step.fit_error_before
+
+
+def _other_bodies(given: MachineModel, other: MachineModel) -> dict[str, tuple[str, ...]]:
+    """Bodies of a mechanism that are others in the second model, and the axes that each changes."""
+    if given.mjcf is None or other.mjcf is None or other.mjcf == given.mjcf:
+        return {}
+    from twin.mujoco.mechanism import mechanism_of
+
+    one, two = (mechanism_of(m.mjcf or "", m.mjcf_name or "", m.joints) for m in (given, other))
+    return one.differing(two)
 
 
 def _changed(given: AxisModel, other: AxisModel) -> dict[str, bool]:

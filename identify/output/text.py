@@ -258,7 +258,10 @@ def all_added_text(result: AllAdded) -> str:
     for axis in dict.fromkeys(step.axis for step in result.steps):
         steps = [step for step in result.steps if step.axis == axis]
         words = result.model.axes[axis].units.words
-        lines.append(f"added {listed([step.effect for step in steps])} to axis {axis}")
+        laws = [step.effect for step in steps if step.action != "body"]
+        bodies = [step.effect for step in steps if step.action == "body"]
+        corrected = f"corrected body {listed(bodies)}, which moves with axis {axis}"
+        lines.append(f"added {listed(laws)} to axis {axis}" if laws else corrected)
         lines += _errors_of(steps[0], words)
     if not result.kept:
         lines.append(

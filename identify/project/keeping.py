@@ -138,8 +138,12 @@ def _fitted(answer: Answer) -> Iterator[ErrorsEntry]:
 
 def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
     steps = answer.get("steps") or [answer]
-    bodies = [body["body"] for body in answer.get("bodies", ())]
-    changes = [step["effect"] for step in steps if "effect" in step]
+    bodies = [f"body {body['body']}" for body in answer.get("bodies", ())]
+    changes = [
+        f"body {step['effect']}" if step["action"] == "body" else step["effect"]
+        for step in steps
+        if "effect" in step
+    ]
     errors = {step["axis"]: step for step in steps if "axis" in step}
     entry = ModelEntry(
         file=str(given["out"]), base=given["model"], change=[*dict.fromkeys(changes), *bodies],

@@ -24,7 +24,7 @@ def _calls(project: Project, model: ModelEntry) -> Iterator[str]:
         yield f'model = twin.load_model("{model.file}")'
     elif model.change == ["fit"]:
         yield "model = identify.fit(model, fit, held, test).model"
-    elif len(model.change) == 1:
+    elif len(model.change) == 1 and not model.change[0].startswith("body "):
         yield f'model = identify.add("{model.change[0]}", model, fit, held, test).model'
     else:
         yield "found = identify.diagnose(model, fit, held, test)"

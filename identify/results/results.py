@@ -317,6 +317,15 @@ def steps_together(
         yield HistoryStep(action, name, dataset.axis, **errors, notes=notes)
 
 
+def step_of_body(body: str, axis: str, before: FitResult, after: FitResult) -> HistoryStep:
+    """The step of a body that was corrected, with the errors of an axis without and with all."""
+    first, last = (
+        _errors_of(r.fits[axis], r.fits[axis], r.datasets[axis]) for r in (before, after)
+    )
+    errors = {k: first[k] if k.endswith("_before") else last[k] for k in first}
+    return HistoryStep("body", body, axis, **errors)
+
+
 # --- what was added, or corrected -----------------------------------------------------------------
 
 

@@ -108,6 +108,14 @@ class Mechanism:
             dof = int(self.model.dof_parentid[dof])
         return sorted(found)
 
+    def differing(self, other: Mechanism) -> dict[str, tuple[str, ...]]:
+        """Bodies whose inertia is another there, and the axes whose forces each changes."""
+        return {
+            self.bodies[k]: tuple(self.axes[i] for i in self.moved_by(k))
+            for k in range(len(self.axes))
+            if not np.allclose(self.inertial(k), other.inertial(k), rtol=1e-9, atol=1e-12)
+        }
+
     def inertial(self, axis: int) -> Array:
         """The ten parameters of the body of an axis, as ``per_unit`` has them."""
         model, turned, body = self.model, np.zeros(9), self._body(axis)

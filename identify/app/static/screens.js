@@ -161,10 +161,21 @@ function axesOf(found) {
 
 function answerOf(found, state) {
   const axes = axesOf(found);
-  const all = axes.flatMap(a => a.findings.filter(f => f.kind === "missing"));
-  return [...axes.map(a => h("div", { class: "card lead" }, h("h3", {}, `Axis ${a.axis}: ${a.explanation}`),
+  const bodies = found.bodies ?? [], recording = found.recording;
+  const all = [...bodies.map(b => `body ${b.body}`), ...axes.flatMap(a => a.findings.filter(f => f.kind === "missing").map(f => f.effect))];
+  return [recording ? h("div", { class: "card warn" }, h("h3", {}, "The recording"), h("p", {}, recording.said)) : null, ...bodies.map(bodyOf), ...axes.map(a => h("div", { class: "card lead" }, h("h3", {}, `Axis ${a.axis}: ${a.explanation}`),
     h("div", { class: "cards" }, ...a.findings.map(f => findingOf(f, a.axis, state)))),
-  ), all.length ? button(all.length > 1 ? `Add all ${all.length}` : `Add ${all[0].effect}`, "add", ["add", "--found"], state, true) : null, all.length > 1 ? h("span", { class: "soft" }, " fits all of them together") : null];
+  ), all.length ? button(all.length > 1 ? `Add all ${all.length}` : `Add ${all[0]}`, "add", ["add", "--found"], state, true) : null, all.length > 1 ? h("span", { class: "soft" }, " fits all of them together") : null];
+}
+
+function bodyOf(b) {
+  const names = [b.body, ...b.ambiguous_with].join(" or ");
+  return h("div", { class: "card lead" }, h("h3", {}, `Body ${names}: another inertia than in the file`),
+    h("p", {}, `${percent(b.confidence)} of such answers were right; it changes the torques of ${b.axes.join(", ")}`), bar("explains of the error", b.part),
+    h("table", {}, h("tbody", {}, ...Object.entries(b.parameters).map(([name, p]) => h("tr", {}, h("td", {}, name),
+      h("td", {}, `${short(p.more)} ± ${short(p.band_90)} ${p.unit} more`))))),
+    b.not_told.length ? h("p", { class: "soft" }, `These joints do not tell its ${b.not_told.join(", ")}.`) : null,
+    b.disagreeing.length ? h("p", { class: "warn-text" }, `The logs ${b.disagreeing.join(", ")} tell another change.`) : null);
 }
 
 function findingOf(f, axis, state) {

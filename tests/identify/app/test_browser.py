@@ -4,12 +4,15 @@ import os
 import signal
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from app_runs import browsed, served
+from arms import ARM, arm_log
 from cli_runs import twin
 
 from identify.project.folder import Folder
+from twin.logs import write_log
 
 
 def recorded(path: Path, rate: float, seed: int, seconds: int = 6) -> Path:
@@ -120,3 +123,41 @@ def test_a_killed_worker_and_an_edit_from_outside_are_told_in_the_page(tmp_path)
         page.click("#undo")
         page.wait_for_selector("text=No model yet")
     assert Folder(folder).read().models == []
+
+
+def loaded(model: mujoco.MjModel) -> None:
+    """0.5 kg more on the forearm, 0.3 m out."""
+    fore = model.body("fore").id
+    model.body_mass[fore], model.body_ipos[fore, 0] = 2.5, (2.0 * 0.15 + 0.5 * 0.3) / 2.5
+
+
+@pytest.mark.slow  # a mechanism diagnosed, twice
+def test_a_mechanism_is_taken_in_with_its_file_and_its_body_is_corrected(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    files = [tmp_path / "arm.xml"]
+    for seed in (1, 2, 3):
+        files.append(tmp_path / f"run{seed}.mcap")
+        write_log(arm_log(seed, change=loaded, duration=8.0), files[-1])
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", [str(file) for file in files])
+        page.click("#take")
+        page.wait_for_selector("td >> text=run3.mcap")
+        page.click("nav >> text=Model")
+        page.select_option("#mjcf", "arm.xml")
+        page.click("#new")
+        page.wait_for_selector("text=Fit its values")
+        assert "elbow" in page.inner_text("main")
+        page.click("nav >> text=Diagnose")
+        page.click("#do-diagnose")
+        page.wait_for_selector("text=Body fore: another inertia than in the file")
+        page.click("#do-add---found")
+        page.wait_for_selector(".ledger li:nth-child(2)")
+    model = Folder(folder).read().models[-1]
+    assert model.change == ["body fore"]
+    assert all(e.after < 0.1 * e.before for e in model.errors)
+    mass = mujoco.MjModel.from_xml_path(str(folder / "models/2.xml")).body("fore").mass[0]
+    assert mass == pytest.approx(2.5, rel=0.01)
