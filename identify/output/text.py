@@ -260,8 +260,10 @@ def all_added_text(result: AllAdded) -> str:
         words = result.model.axes[axis].units.words
         laws = [step.effect for step in steps if step.action != "body"]
         bodies = [step.effect for step in steps if step.action == "body"]
-        corrected = f"corrected body {listed(bodies)}, which moves with axis {axis}"
-        lines.append(f"added {listed(laws)} to axis {axis}" if laws else corrected)
+        if laws:
+            lines.append(f"added {listed(laws)} to axis {axis}")
+        if bodies:
+            lines.append(f"corrected body {listed(bodies)}, which moves with axis {axis}")
         lines += _errors_of(steps[0], words)
     if not result.kept:
         lines.append(
