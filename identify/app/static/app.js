@@ -99,11 +99,13 @@ function showLedger(state) {
     state.ledger.length ? null : h("p", { class: "soft" }, "No model yet."),
     h("ol", { class: "ledger" }, ...state.ledger.map(entry => h("li", {}, h("b", {}, entry.file),
       h("span", { class: "soft" }, `= ${entry.made}`),
-      ...entry.errors.map(e => h("div", {}, state.ledger.length && several(entry) ? `${e.axis}: ` : "", e.told))))),
+      ...telling(entry.errors).map(e => h("div", {}, several(entry) ? `${e.axis}: ` : "", e.told))))),
   ]);
 }
 
 const several = entry => new Set(entry.errors.map(e => e.axis)).size > 1;
+// Of several axes the logs on which least was decided: those come first.
+const telling = errors => several({ errors }) ? errors.filter((e, k) => errors.findIndex(o => o.axis === e.axis) === k) : errors;
 let shownAs = "history";
 
 function showCommands(state) {
