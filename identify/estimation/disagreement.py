@@ -80,6 +80,26 @@ def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
     return odd if odd and odd.log in {log.motion.name for log in dataset.test} else None
 
 
+def suspect(axis: AxisModel, dataset: Dataset) -> str | None:
+    """The log that a fit of the others leaves more of than of any of them, most of all such logs.
+
+    It may be spoiled, or excite alone what the model lacks: that is to be asked. None where there
+    are too few logs that decide, or where it is a mechanism's.
+    """
+    logs = (*dataset.training, *dataset.selection)
+    if any(log.motion.bodies is not None for log in logs):
+        return None
+    rows = _rows(axis, logs, Scaling.of(axis, logs).where)
+    if len(rows) < FEWEST:
+        return None
+    times = dict[str, float]()
+    for k, own in enumerate(rows):
+        left, theirs = _predicted(own, [*rows[:k], *rows[k + 1 :]])
+        times[own.log.motion.name] = rms(left) / max(map(rms, theirs))
+    worst = max(times, key=lambda name: times[name])
+    return worst if times[worst] > 1.0 else None
+
+
 def _longer(logs: Sequence[PreparedLog]) -> list[PreparedLog]:
     """The logs by test functions of a usual length, where theirs is clearly shorter."""
     if not logs or 1.5 * logs[0].test_function.length > LOOK:
@@ -137,10 +157,7 @@ def _against(
     """How a log disagrees with the others; None where it does not."""
     own, others = rows[k], [r for i, r in enumerate(rows) if i != k]
     more = FEW if len(rows) == FEWEST else 1.0
-    step = _step(
-        np.concatenate([r.columns for r in others]), np.concatenate([r.left for r in others])
-    )
-    left, theirs = own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
+    left, theirs = _predicted(own, others)
     most = max(map(rms, theirs))
     if (moment := _moment(own, left, theirs, more)) is not None:
         return moment
@@ -156,6 +173,14 @@ def _against(
     if seen > more * OUT * most:
         return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
     return None
+
+
+def _predicted(own: _Rows, others: Sequence[_Rows]) -> tuple[Array, list[Array]]:
+    """What a fit of other logs leaves of a log (n,) N, and of each of them."""
+    step = _step(
+        np.concatenate([r.columns for r in others]), np.concatenate([r.left for r in others])
+    )
+    return own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
 
 
 def _gains(

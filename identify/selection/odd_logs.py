@@ -14,7 +14,7 @@ from dataclasses import replace
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
-from identify.estimation.disagreement import odd_in
+from identify.estimation.disagreement import odd_in, suspect
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.doubts import Conclusion
 
@@ -30,18 +30,43 @@ def without_odd_log(
     """
     odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
-        ended = conclude(*_others(base, dataset, odd))
+        ended = conclude(*_others(base, dataset, odd.log if odd else None))
         first, odd = odd, _odd_beside(ended, dataset)
         if (first and first.log) == (odd and odd.log):
-            return ended, odd
-    return conclude(base, dataset), None  # in turns this log and that: it is no log
+            break
+    else:
+        ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
+    if odd is None and _is_unexplained(ended):
+        return _without_suspect(base, dataset, conclude) or (ended, None)
+    return ended, odd
 
 
-def _others(base: Fit, dataset: Dataset, odd: Disagreement | None) -> tuple[Fit, Dataset]:
+def _is_unexplained(ended: Conclusion) -> bool:
+    """Whether something is left, and nothing was found that explains any of it."""
+    final = ended.found.final
+    return not ended.findings and not (final.fit.at_floor or final.other_at_floor)
+
+
+def _without_suspect(
+    base: Fit, dataset: Dataset, conclude: Callable[[Fit, Dataset], Conclusion]
+) -> tuple[Conclusion, Disagreement] | None:
+    """What the logs but the worst of them come to, where it disagrees beside what they prove.
+
+    Where all that is left is of one log, nothing is proved with it, and beside so much it does not
+    stand out: both are seen only at once.
+    """
+    if (name := suspect(base.axis, dataset)) is None:
+        return None
+    ended = conclude(*_others(base, dataset, name))
+    odd = _odd_beside(ended, dataset)
+    return (ended, odd) if ended.findings and odd is not None and odd.log == name else None
+
+
+def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]:
     """The fit of the logs but an odd one, and these; a test log stays, as it decides nothing."""
-    if odd is None or odd.log in {log.motion.name for log in dataset.test}:
+    if odd is None or odd in {log.motion.name for log in dataset.test}:
         return base, dataset
-    rest = dataset.without(odd.log)
+    rest = dataset.without(odd)
     if [*rest.training] == [*dataset.training]:
         return base, rest
     return replace(fit_axis(base.axis, rest.training), begun=base.begun), rest

@@ -99,3 +99,17 @@ def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
     assert odd.log == "run1"
     assert odd.otherwise is not None
     assert odd.otherwise[0] == "coulomb_viscous.Fc"
+
+
+def test_what_one_log_hides_is_found_where_nothing_explains_what_is_left() -> None:
+    """The log that chooses is tilted: with it no spring is proved, and beside none it is not far off."""
+    logs = runs(having(SLIDE, "spring", k1=20.0))
+    tilted = with_force(logs.pop("run3"), lambda force: force + 0.5)
+    found = identify.diagnose(
+        MODEL, logs, {"run3": tilted}, catalogue=few("spring", "cogging", "quadratic_drag")
+    ).axes["x"]
+    assert found.named == ("spring",)
+    odd = found.dataset.odd
+    assert odd is not None
+    assert (odd.log, odd.otherwise and odd.otherwise[0]) == ("run3", "spring.offset")
+    assert odd.otherwise[1] == pytest.approx(0.5, rel=0.02)
