@@ -102,7 +102,7 @@ def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
 
 
 def test_what_one_log_hides_is_found_where_nothing_explains_what_is_left() -> None:
-    """The log that chooses is tilted: with it no spring is proved, beside none it is not far out."""
+    """The log that chooses is tilted: with it no spring is proved, and it is not far out."""
     logs = runs(having(SLIDE, "spring", k1=20.0))
     tilted = with_force(logs.pop("run3"), lambda force: force + 0.5)
     found = identify.diagnose(
