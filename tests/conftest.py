@@ -23,19 +23,19 @@ LONGEST_WAIT = 300.0  # s for what another worker compiles
 # begin first, so that the workers end together.
 LONGEST = (
     "test_types",
-    "test_points",
-    "test_catalogue_laws",
-    "test_catalogue_recovery",
     "test_readme",
-    "test_laws_units",
-    "test_chapters",
-    "test_one_dataset",
-    "test_command_line",
+    "test_catalogue_recovery",
+    "test_catalogue_laws",
+    "test_report",
+    "test_silent_logs",
+    "test_points",
+    "test_emps_product",
+    "test_roles",
+    "test_user_effects",
+    "test_joints",
     "test_plan",
     "test_search",
-    "test_machines",
-    "test_report",
-    "test_noise",
+    "test_rooms",
 )
 
 

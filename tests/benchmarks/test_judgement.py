@@ -8,28 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planted_logs import SLIDE, asked, few, having
 
-from benchmarks.foreign import CATALOGUE, STAGE, diagnosed
 from benchmarks.judgement import Expected, in_line, row_of, stated_wrong
-from benchmarks.second_simulator.effects import INSIDE
-from benchmarks.second_simulator.machine import drawn
 from benchmarks.withheld import CASES, judge
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
-from twin.effects import Catalogue
 
-FEW = Catalogue([CATALOGUE[n] for n in ("asymmetric_friction", "cogging", "quadratic_drag")])
+FEW = few("asymmetric_friction", "cogging", "quadratic_drag")
 
 
 @pytest.fixture(scope="module")
 def found() -> AxisDiagnosis:
     """A machine with cogging that its model lacks."""
-    base = drawn(np.random.default_rng(5), 4e3)
-    machine = INSIDE["cogging"].make(base, 0.01, np.random.default_rng(5))
-    return diagnosed(STAGE, machine, 5, 6.0, FEW)
+    return asked(SLIDE, having(SLIDE, "cogging", p=0.021, a1=0.03, b1=0.02), FEW)
 
 
-@pytest.mark.slow
 def test_a_row_holds_the_answer_and_whether_it_is_right(found: AxisDiagnosis) -> None:
     row = json.loads(json.dumps(row_of("a machine", Expected(("cogging",)), found, 1.0)))
     (finding,) = row["findings"]
@@ -42,7 +36,6 @@ def test_a_row_holds_the_answer_and_whether_it_is_right(found: AxisDiagnosis) ->
     assert "right: missing cogging" in in_line(row)
 
 
-@pytest.mark.slow
 def test_the_same_answer_is_wrong_where_another_effect_or_nothing_is_hidden(
     found: AxisDiagnosis,
 ) -> None:
@@ -59,7 +52,6 @@ def test_the_same_answer_is_wrong_where_another_effect_or_nothing_is_hidden(
     assert stated_wrong(rows) == ["a machine: cogging"] * 2
 
 
-@pytest.mark.slow
 def test_a_diagnosis_without_findings_is_silent_unless_there_is_nothing(
     found: AxisDiagnosis,
 ) -> None:

@@ -45,12 +45,12 @@ def named(found):
     return [(m.group.what, m.group.place) for m in found.moved]
 
 
-@pytest.mark.short(1)
+@pytest.mark.short(2)
 @pytest.mark.parametrize(
     ("changed", "right"),
     [
-        (Changed(), []),
         (Changed(payload=0.8), [(What.BODY, "link3")]),
+        (Changed(), []),
         (Changed(rotor={1: 0.4 * OWN[1]}), [(What.ROTOR, "joint2")]),
         (Changed(gain={1: 0.12}), [(What.GAIN, "joint2")]),
         pytest.param(
