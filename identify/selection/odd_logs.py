@@ -53,13 +53,18 @@ def _without_suspect(
     """What the logs but the worst of them come to, where it disagrees beside what they prove.
 
     Where all that is left is of one log, nothing is proved with it, and beside so much it does not
-    stand out: both are seen only at once.
+    stand out: both are seen only at once. But the log that refutes a wrong law is left out as well
+    by this. So it must be otherwise in one value that is no matter of what was found without it.
     """
     if (name := suspect(base.axis, dataset)) is None:
         return None
     ended = conclude(*_others(base, dataset, name))
     odd = _odd_beside(ended, dataset)
-    return (ended, odd) if ended.findings and odd is not None and odd.log == name else None
+    if not ended.findings or odd is None or odd.log != name or odd.otherwise is None:
+        return None
+    law = odd.otherwise[0].partition(".")[0]
+    own = law in {step.change.name for step in ended.found.steps}
+    return None if own or not odd.is_sure else (ended, odd)
 
 
 def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]:
