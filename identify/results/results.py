@@ -319,11 +319,13 @@ def steps_together(
 
 def step_of_body(body: str, axis: str, before: FitResult, after: FitResult) -> HistoryStep:
     """The step of a body that was corrected, with the errors of an axis without and with all."""
-    first, last = (
-        _errors_of(r.fits[axis], r.fits[axis], r.datasets[axis]) for r in (before, after)
-    )
-    errors = {k: first[k] if k.endswith("_before") else last[k] for k in first}
-    return HistoryStep("body", body, axis, **errors)
+    return HistoryStep(
+        "body", body, axis, unit=after.fits[axis].axis.units.force,
+        fit_error_before=before.fits[axis].error, fit_error_after=after.fits[axis].error,
+        holdout_error_before=before.holdout_error[axis],
+        holdout_error_after=after.holdout_error[axis],
+        test_error_before=before.test_error[axis], test_error_after=after.test_error[axis],
+    )  # fmt: skip
 
 
 # --- what was added, or corrected -----------------------------------------------------------------
