@@ -138,7 +138,8 @@ def _fitted(answer: Answer) -> Iterator[ErrorsEntry]:
 
 def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
     steps = answer.get("steps") or [answer]
-    bodies = [f"body {body['body']}" for body in answer.get("bodies", ())]
+    if "body" in answer:
+        return _corrected(given, answer)
     changes = [
         f"body {step['effect']}" if step["action"] == "body" else step["effect"]
         for step in steps
@@ -146,9 +147,23 @@ def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
     ]
     errors = {step["axis"]: step for step in steps if "axis" in step}
     entry = ModelEntry(
-        file=str(given["out"]), base=given["model"], change=[*dict.fromkeys(changes), *bodies],
+        file=str(given["out"]), base=given["model"], change=[*dict.fromkeys(changes)],
         proved=answer.get("kept", True),
         errors=[e for step in errors.values() for e in _of_step(step)],
+    )  # fmt: skip
+    return lambda project: _more(project, "models", entry)
+
+
+def _corrected(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    """A body of the mechanism whose inertia is another, and what that does to each joint."""
+    errors = [
+        ErrorsEntry(axis=axis, role=own["on"], after=own["after"], before=own["before"],
+                    unit=own["unit"])
+        for axis, own in answer["errors"].items()
+    ]  # fmt: skip
+    entry = ModelEntry(
+        file=str(given["out"]), base=given["model"], change=[f"body {answer['body']}"],
+        errors=errors,
     )  # fmt: skip
     return lambda project: _more(project, "models", entry)
 

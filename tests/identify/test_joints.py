@@ -36,6 +36,8 @@ from identify.mechanism.departures import departures_of
 from identify.mechanism.groups import What
 from identify.output.as_json import answer_of
 from identify.output.text import text_of
+from identify.project.folder import Folder
+from identify.project.keeping import keep
 from identify.selection.diagnosis import diagnose_axis
 from identify.selection.trying import try_effect
 from identify.validation.free_run import errors_of_both
@@ -458,6 +460,15 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     assert (answer["body"], answer["mujoco"], answer["element"]) == (
         "fore", "corrected.xml", element,
     )  # fmt: skip
+    given = {"model": "arm.toml", "out": "corrected.toml"}
+    project = Folder(tmp_path)
+    project.begin()
+    keep(project, "add", given, answer, "twin add link_mass")
+    ledger = project.read().models[-1]
+    assert ledger.change == ["body fore"]
+    assert {e.axis: e.after for e in ledger.errors} == {
+        axis: own["after"] for axis, own in answer["errors"].items()
+    }
     old = '<inertial pos="0.15 0.02 0" mass="2" diaginertia="0.004 0.02 0.02"/>'
     assert (tmp_path / "corrected.xml").read_text() == ARM.replace(old, element)
     assert (tmp_path / "arm.xml").read_text() == ARM
