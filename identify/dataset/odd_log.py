@@ -3,8 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 FEWEST = 3  # logs; of two, nobody can tell which of them is wrong
+
+
+class Recorded(Enum):
+    """What may be otherwise in a recording and is no parameter of a model."""
+
+    GAIN = "gain"  # of the force that was recorded, over what acted
+    CONSTANT = "constant"  # N, that acts in it alone
+    DELAY = "delay"  # s, by which its force came later
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """One value that explains how a log disagrees: it in the log, and in the others.
+
+    what: the parameter by its label, or what is of the recording.
+    """
+
+    what: str | Recorded
+    there: float
+    elsewhere: float
+
+    @property
+    def effect(self) -> str | None:
+        """The effect whose parameter it is; None of the mass, and of what is of the recording."""
+        return None if isinstance(self.what, Recorded) else self.what.partition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -13,15 +39,14 @@ class Disagreement:
 
     error, others: N RMS that a fit of the others leaves in it, and at most in any of them; of a
     moment its peaks. span: s, from when to when most of its error is; None where throughout.
-    otherwise: the parameter that would be otherwise in it, "force" for a factor of all force; its
-    value there and in the others; None where no single one explains it.
+    otherwise: None where no single value explains it.
     """
 
     log: str
     error: float
     others: float
     span: tuple[float, float] | None = None
-    otherwise: tuple[str, float, float] | None = None
+    otherwise: Otherwise | None = None
 
     @property
     def times(self) -> float:

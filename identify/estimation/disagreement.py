@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.odd_log import FEWEST, Disagreement
+from identify.dataset.odd_log import FEWEST, Disagreement, Otherwise, Recorded
 from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.test_function import LOOK
 from identify.estimation.evidence import rms
@@ -40,12 +40,14 @@ MOMENT = 0.1  # of a log; what lasts longer is no moment
 class _Rows:
     """Of one log what tells: residual (n,) N, its columns (n, k), states (n, 4), times (n,) s.
 
-    size (k,): N per unit, by which the columns were divided. kept: which test functions tell.
+    recorded (n, 3): N per unit of each of Recorded. size (k + 3,): N per unit, by which the columns
+    were divided; 1 of those of the recording. kept: which test functions tell.
     """
 
     log: PreparedLog
     left: Array
     columns: Array
+    recorded: Array
     states: Array
     time: Array
     size: Array
@@ -137,10 +139,18 @@ def _rows(
     states = [_states(log) for log in logs]
     usual = np.sqrt(np.mean(np.concatenate(states) ** 2, axis=0))
     usual = np.where(usual > 0.0, usual, 1.0)
+    size = np.append(size, np.ones(len(Recorded)))
     parts = zip(logs, left, columns, states, kept, strict=True)
     return [
-        _Rows(g, r[k], c[k], s[k] / usual, g.time[k], size, k) for g, r, c, s, k in parts if k.any()
-    ]
+        _Rows(g, r[k], c[k], _recorded(g)[k], s[k] / usual, g.time[k], size, k)
+        for g, r, c, s, k in parts if k.any()
+    ]  # fmt: skip
+
+
+def _recorded(log: PreparedLog) -> Array:
+    """What one of each of Recorded adds to what is unbalanced in a log (n, 3) N per unit."""
+    w, force = log.test_function, log.command
+    return np.stack([force, np.ones_like(force), -rate(force, w.stride * w.period)], axis=1)
 
 
 def _states(log: PreparedLog) -> Array:
@@ -167,7 +177,7 @@ def _against(
     if own_value is not None and near.any():
         change = abs(_gains(own, left, near)[0][best])
         far = change > more * CLEAR * _scatter(best, others, theirs)
-        if far and change > CHANGED * _usual(best, own, own_value[2], where):
+        if far and change > CHANGED * _usual(best, own, own_value.elsewhere, where):
             return Disagreement(name, rms(left), most, None, own_value)
     seen = min(rms(left), rms(left[near])) if near.any() else 0.0
     if seen > more * OUT * most:
@@ -186,21 +196,21 @@ def _predicted(own: _Rows, others: Sequence[_Rows]) -> tuple[Array, list[Array]]
 def _gains(
     own: _Rows, left: Array, among: slice | NDArray[np.bool_] = slice(None)
 ) -> tuple[Array, Array]:
-    """How much of each column (k,), and of the command, alone takes most of what is left (n,) N.
+    """How much of each column (k + 3,) alone takes most of what is left (n,) N.
 
     And the sum of squares of each. among: which rows are asked.
     """
-    columns = np.column_stack([own.columns, own.log.command[own.kept]])[among]
+    columns = np.column_stack([own.columns, own.recorded])[among]
     size = np.sum(columns**2, axis=0)
     return columns.T @ left[among] / np.where(size > 0.0, size, np.inf), size
 
 
 def _usual(at: int, own: _Rows, value: float, where: Sequence[ParameterReference]) -> float:
     """The gain of a column that its value is, or the command, where it may have either sign."""
-    if at < len(where) and where[at].parameter.lower < 0.0:
-        size = np.linalg.norm(own.columns[:, at]) or np.inf
-        return float(np.linalg.norm(own.log.command[own.kept]) / size)
-    return abs(value) * float(np.append(own.size, 1.0)[at])
+    if at < len(where) and where[at].parameter.lower >= 0.0:
+        return abs(value) * float(own.size[at])
+    column = np.column_stack([own.columns, own.recorded])[:, at]
+    return float(np.linalg.norm(own.log.command[own.kept]) / (np.linalg.norm(column) or np.inf))
 
 
 def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float:
@@ -214,7 +224,7 @@ def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float
 
 
 def _best(own: _Rows, left: Array) -> tuple[int, float | None]:
-    """The column that alone takes most of what is left (n,) N, the last that of the command.
+    """The column that alone takes most of what is left (n,) N; the last are of the recording.
 
     With its gain, where that explains it.
     """
@@ -227,13 +237,16 @@ def _best(own: _Rows, left: Array) -> tuple[int, float | None]:
 
 def _otherwise(
     best: int, gain: float, own: _Rows, axis: AxisModel, where: Sequence[ParameterReference]
-) -> tuple[str, float, float] | None:
-    """The parameter of a column, its value in a log and in others; None where it can have none."""
-    if best == len(where):
-        return "force", 1.0 - gain, 1.0
+) -> Otherwise | None:
+    """The value of a column in a log and in others; None where it can have none there."""
+    if best >= len(where):
+        what = [*Recorded][best - len(where)]
+        if what is Recorded.GAIN:  # what acted is the recorded force over its gain
+            return Otherwise(what, 1.0 / (1.0 - gain), 1.0) if gain < 1.0 else None
+        return Otherwise(what, gain, 0.0)
     value = float(read(axis, where[best : best + 1])[0])
     other, least = value - gain / float(own.size[best]), where[best].parameter.lower
-    return (where[best].label, other, value) if other >= least else None
+    return Otherwise(where[best].label, other, value) if other >= least else None
 
 
 def _step(columns: Array, force: Array) -> Array:

@@ -62,8 +62,7 @@ def _without_suspect(
     odd = _odd_beside(ended, dataset)
     if not ended.findings or odd is None or odd.log != name or odd.otherwise is None:
         return None
-    law = odd.otherwise[0].partition(".")[0]
-    own = law in {step.change.name for step in ended.found.steps}
+    own = odd.otherwise.effect in {step.change.name for step in ended.found.steps}
     return None if own or not odd.is_sure else (ended, odd)
 
 

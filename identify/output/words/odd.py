@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.odd_log import Disagreement
+from identify.dataset.odd_log import Disagreement, Otherwise, Recorded
 from identify.output.numbers import number, quantity
 from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
 from twin.model.units import AxisUnits
@@ -44,8 +44,19 @@ def _disagrees(odd: Disagreement, units: AxisUnits) -> str:
         said += f": {odd.times:.1f} times their error, {error} of {others}"
     if odd.span:
         said += ", above all from " + " to ".join(quantity(instant, "s") for instant in odd.span)
-    if odd.otherwise:
-        label, there, elsewhere = odd.otherwise
-        name = units.mass_name if label == "mass" else units.words(label)
-        said += f", as if {name} were {number(there / elsewhere)} times as large in it"
-    return said
+    return f"{said}, as if {_otherwise(odd.otherwise, units)}" if odd.otherwise else said
+
+
+def _otherwise(own: Otherwise, units: AxisUnits) -> str:
+    """What would be otherwise in a log."""
+    match own.what:
+        case Recorded.GAIN:
+            return f"its force were recorded {number(own.there)} times as large"
+        case Recorded.CONSTANT:
+            return f"a constant {quantity(own.there, units.force)} acted in it alone"
+        case Recorded.DELAY:
+            late = "later" if own.there > 0.0 else "earlier"
+            return f"its force came {quantity(abs(own.there), 's')} {late}"
+        case label:
+            name = units.mass_name if label == "mass" else units.words(label)
+            return f"{name} were {number(own.there / own.elsewhere)} times as large in it"

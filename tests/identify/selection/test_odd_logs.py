@@ -15,6 +15,7 @@ from benchmarks.second_simulator.recordings import AXIS, recordings
 from benchmarks.silence import cases
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Dataset
+from identify.dataset.odd_log import Recorded
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -50,10 +51,29 @@ def test_another_payload_is_told_with_its_mass() -> None:
     odd = fitted(runs(run2=replace(SLIDE, mass=1.5 * SLIDE.mass))).odd
     assert odd is not None
     assert odd.log == "run2"
+    own = odd.otherwise
+    assert own is not None
+    assert own.what == "mass"
+    assert own.there / own.elsewhere == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "what", "size"),
+    [
+        (lambda force: 0.75 * force, Recorded.GAIN, 0.75),
+        (lambda force: force + 2.0, Recorded.CONSTANT, 2.0),
+        (lambda force: np.roll(force, 20), Recorded.DELAY, 20 / RATE),
+    ],
+)
+def test_what_is_otherwise_in_a_recording_is_told(change, what, size) -> None:
+    """Its gain, a constant in it alone (a tilt), a delay of its force."""
+    logs = runs()
+    odd = fitted({**logs, "run1": with_force(logs["run1"], change)}).odd
+    assert odd is not None
+    assert odd.log == "run1"
     assert odd.otherwise is not None
-    label, there, elsewhere = odd.otherwise
-    assert label == "mass"
-    assert there / elsewhere == pytest.approx(1.5, rel=0.05)
+    assert odd.otherwise.what == what
+    assert odd.otherwise.there == pytest.approx(size, rel=0.05)
 
 
 def test_a_push_is_told_with_its_time() -> None:
@@ -103,7 +123,7 @@ def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
     assert odd is not None
     assert odd.log == "run1"
     assert odd.otherwise is not None
-    assert odd.otherwise[0] == "coulomb_viscous.Fc"
+    assert odd.otherwise.what == "coulomb_viscous.Fc"
 
 
 @pytest.mark.slow  # a drive of the second simulator with five logs, 20 s
@@ -122,4 +142,4 @@ def test_what_one_log_hides_is_found_where_nothing_explains_what_is_left() -> No
     assert told.dataset.odd is not None
     assert told.dataset.odd.log == "sines"
     assert told.dataset.odd.otherwise is not None
-    assert told.dataset.odd.otherwise[0] == "force"
+    assert told.dataset.odd.otherwise.what == Recorded.GAIN
