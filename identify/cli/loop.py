@@ -252,7 +252,7 @@ def add(
     Example: twin add cogging fitted.toml fit.mcap --holdout held.mcap -o better.toml
     """
     from identify import adding
-    from identify.mechanism.bodies import LINK_MASS
+    from identify.dataset.body import LINK_MASS
     from identify.output.as_json import found_in
 
     machine, catalogue = loaded(model, effects)

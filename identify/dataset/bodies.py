@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from twin.logs import Log
 from twin.model.machine import MachineModel
 from twin.parallel import spread
 from twin.signals import Array, between, local_parabola
+
+if TYPE_CHECKING:
+    from twin.mujoco.mechanism import Mechanism
 
 PIECE = 1 << 12  # samples whose motion is held at once; of 40 joints it takes 10 MB
 
@@ -62,7 +66,7 @@ class Bodies:
 
     momentum: N s, beyond mass x velocity. force: N, what they take beyond the change of momentum.
     joints: the motion of all joints over the log. index: which of them this is. samples: those of
-    the log. mass: kg, of which the momentum is not told.
+    the log. mass: kg, of which the momentum is not told. mechanism: whose bodies they are.
     """
 
     momentum: Array
@@ -71,6 +75,7 @@ class Bodies:
     index: int
     samples: slice
     mass: float
+    mechanism: Mechanism
 
     @property
     def readings(self) -> tuple[Array, ...]:
@@ -142,7 +147,7 @@ def bodies_along(model: MachineModel, log: Log, name: str) -> dict[str, Bodies]:
 
     spread(take, [slice(k, min(k + PIECE, count)) for k in range(0, count, PIECE)])
     return {
-        axis: Bodies(momentum[i], force[i], joints, i, slice(0, count), float(mass))
+        axis: Bodies(momentum[i], force[i], joints, i, slice(0, count), float(mass), mechanism)
         for i, (axis, mass) in enumerate(zip(mechanism.axes, mechanism.inertia, strict=True))
     }
 

@@ -12,17 +12,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identify.dataset.body import Body
 from identify.dataset.dataset import Dataset
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths_by
-from identify.mechanism.bodies import Body, WrongBody
+from identify.mechanism.bodies import WrongBody
 from identify.mechanism.choice import Choice, Moved
-from identify.mechanism.groups import Group, What, groups_of
+from identify.mechanism.groups import Group, groups_of
 from identify.mechanism.regression import Regression, Solution, regression_of
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.of_bodies import What
 from twin.effects import Catalogue
 from twin.model.machine import MachineModel
 from twin.parallel import Progress, silent

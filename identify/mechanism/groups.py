@@ -13,55 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
+from identify.dataset.body import INERTIAL, Body
 from identify.dataset.prepared_log import PreparedLog, Reach
-from identify.mechanism.bodies import INERTIAL, LINK_MASS, Body
-from twin.effect import Effect, Kind
-from twin.effects import Catalogue
+from identify.selection.of_bodies import What
 from twin.model.machine import AxisModel
 from twin.signals import Array
-
-
-class What(Enum):
-    """A kind of group, in words."""
-
-    BODY = LINK_MASS
-    ROTOR = "rotor"
-    GAIN = "motor constant"
-    LOAD = "friction by load"
-    CURVE = "torque by place"
-
-    def covers(self, effect: Effect) -> bool:
-        """Whether an effect of one joint is a law of such a group.
-
-        A motor that saturates below most of its torque, or has a deadband, is nearly another
-        constant.
-        """
-        if effect.is_nonparametric or effect.states:
-            return False
-        if self is What.ROTOR:
-            return effect.added_mass is not None
-        if self is What.GAIN:
-            return effect.kind is Kind.ACTUATION and not _reads_any(effect, "X", "V", "TIME")
-        if self is What.LOAD:
-            return effect.kind is Kind.MODIFIER and effect.reads("LOAD")
-        repeats = any(p.period for p in effect.parameters)
-        of_place = effect.reads("X") and not _reads_any(effect, "V", "TIME") and not repeats
-        return self is What.CURVE and effect.kind is Kind.FORCE and of_place
-
-    def named(self, catalogue: Catalogue) -> str:
-        """The law by which it is told first: that of joints, or that of the fewest parameters."""
-        own = [e for e in catalogue.values() if self.covers(e)]
-        first = sorted(own, key=lambda e: (not e.of_joints, len(e.parameters)))
-        return first[0].name if first else self.value
-
-
-def _reads_any(effect: Effect, *slots: str) -> bool:
-    return any(map(effect.reads, slots))
-
 
 ORDER = 3  # of the curve of a joint's angle
 

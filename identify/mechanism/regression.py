@@ -23,9 +23,10 @@ from identify.estimation.evidence import blocks_of, effective_samples, rms
 from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import RIDGE, ROUNDING
 from identify.mechanism.bodies import possible
-from identify.mechanism.groups import Group, What
+from identify.mechanism.groups import Group
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, taken
+from identify.selection.of_bodies import What
 from twin.signals import Array
 
 

@@ -26,6 +26,7 @@ from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_c
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
+from identify.selection.of_bodies import is_of_bodies
 from identify.selection.search import Found, Step
 from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
@@ -260,7 +261,10 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
 
 def _doubt(change: Change, less: Judged, final: Judged) -> str | None:
     """Why the values of a change cannot be its own, in words; None where they can."""
-    return doubt(less, final.fit, change.effect, parameters(change))
+    own = doubt(less, final.fit, change.effect, parameters(change))
+    if own is None and is_of_bodies(less, final, change.effect):
+        return "other values of the bodies of the file, each within a tenth, explain as much"
+    return own
 
 
 def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Finding:

@@ -33,12 +33,12 @@ from identify.analysis.recording import misassigned
 from identify.dataset.preparation import datasets
 from identify.estimation.open_loop import open_loop
 from identify.mechanism.departures import departures_of
-from identify.mechanism.groups import What
 from identify.output.as_json import answer_of
 from identify.output.text import text_of
 from identify.project.folder import Folder
 from identify.project.keeping import keep
 from identify.selection.diagnosis import diagnose_axis
+from identify.selection.of_bodies import What
 from identify.selection.trying import try_effect
 from identify.validation.free_run import errors_of_both
 from identify.workflow import compare, diagnose, fit, plan

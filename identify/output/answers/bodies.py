@@ -6,8 +6,9 @@ from typing import Any
 
 from pydantic import Field
 
+from identify.dataset.body import INERTIAL
 from identify.dataset.dataset import Role
-from identify.mechanism.bodies import INERTIAL, WrongBody
+from identify.mechanism.bodies import WrongBody
 from identify.output.answers import Answer, Entry, Number, answer_of, read
 from identify.results.results import CorrectedBody
 from twin.model.machine import MachineModel

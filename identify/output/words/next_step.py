@@ -9,13 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from identify.dataset.body import INERTIAL, LINK_MASS
 from identify.dataset.dataset import Dataset, Role
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.experiment_design.rival_hypotheses import STRENGTH
-from identify.mechanism.bodies import INERTIAL, LINK_MASS, WrongBody
+from identify.mechanism.bodies import WrongBody
 from identify.output.numbers import DisplayUnit, arrow, listed, number, percent, quantity, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
 from identify.results.results import Addition, Diagnosis

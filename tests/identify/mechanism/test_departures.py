@@ -14,7 +14,7 @@ from benchmarks.second_simulator.arms import Changed, drawn, inertia, log_of
 from identify.analysis.first_model import first_model
 from identify.mechanism.bodies import possible
 from identify.mechanism.departures import departures_of
-from identify.mechanism.groups import What
+from identify.selection.of_bodies import What
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
 
