@@ -142,7 +142,14 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
             return "it takes the place of the friction, which another friction would"
     if _has_lost_inertia(before.fit, fit):
         return "it takes the place of the inertia"
+    if dataset.channel_delay > 0.0 and _is_late(effect):
+        return "the force acts before its time stamp, where it would act after it"
     return None
+
+
+def _is_late(effect: Effect) -> bool:
+    """Whether a force acts, or a motion is read, the later for an effect."""
+    return effect.dead_time or (effect.kind is Kind.ACTUATION and bool(effect.states))
 
 
 def imitation_of(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:

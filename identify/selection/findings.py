@@ -263,7 +263,7 @@ def _doubt(change: Change, less: Judged, final: Judged) -> str | None:
     """Why the values of a change cannot be its own, in words; None where they can."""
     own = doubt(less, final.fit, change.effect, parameters(change))
     if own is None and is_of_bodies(less, final, change.effect):
-        return "other values of the bodies of the file, each within a tenth, explain as much"
+        return "another rotor, or bodies with values within a tenth of the file's, explain as much"
     return own
 
 

@@ -1,4 +1,4 @@
-"""Whether other values of the bodies of a mechanism explain what a law of one joint does.
+"""Whether other bodies or another rotor explain what a law of one joint of a mechanism does.
 
 Masses and centres of a file are seldom better than a tenth: two models of one machine by its own
 makers differ by as much. And those that logs corrected are as good as what was known of the joints
@@ -18,7 +18,7 @@ from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import jacobian
-from identify.estimation.least_squares import RIDGE
+from identify.estimation.least_squares import RIDGE, orthonormal, unabsorbed
 from identify.selection.acceptance import Judged
 from identify.selection.search import NEARLY
 from twin.effect import Effect, Kind
@@ -69,25 +69,28 @@ def _reads_any(effect: Effect, *slots: str) -> bool:
 def is_of_bodies(less: Judged, final: Judged, effect: Effect) -> bool:
     """Whether bodies within their accuracy take nearly as much as a law does, of all its logs.
 
-    less, final: the fits without the law and with it. A friction, which turns with the velocity, is
-    none, and of what is asked of all joints at once it is known.
+    And the rotor, of which a file knows little. Beside the parameters of the fit without the law,
+    which are free in each group of logs. less, final: the fits without the law and with it. A
+    friction, which turns with the velocity, is none, and of what is asked of all joints at once it
+    is known.
     """
     bodies = _carried_by(less.dataset)
     known = effect.kind is Kind.FRICTION or any(what.covers(effect) for what in What)
     if known or not bodies:
         return False
     fit, chosen = less.fit, less.dataset.selection
-    step = _step(fit.jacobian, _of(bodies, less, less.dataset.training), fit.residual, final)
-    pairs = [(fit.residual, fit.jacobian, final.fit.residual, less.dataset.training)]
+    own, given = fit.basis, less.dataset.training
+    of_bodies = unabsorbed(_of(bodies, less, given), own)
+    left, after = (unabsorbed(one.fit.residual, own) for one in (less, final))
+    change = _within_accuracy(of_bodies, left)
+    pairs = [(left, left + of_bodies @ change, after)]
     if chosen:
-        left, after = (error_on(one.fit.axis, chosen) for one in (less, final))
-        own = jacobian(fit.axis, chosen, fit.scaling.where)[moving(chosen, sticks(fit.axis))]
-        pairs.append((left, own, after, chosen))
-    return all(
-        _falls(left, left + np.hstack([columns, _of(bodies, less, logs)]) @ step)
-        >= NEARLY * _falls(left, after)
-        for left, columns, after, logs in pairs
-    )
+        rows = moving(chosen, sticks(fit.axis))
+        own = orthonormal(jacobian(fit.axis, chosen, fit.scaling.where)[rows])
+        of_bodies = unabsorbed(_of(bodies, less, chosen), own)
+        left, after = (unabsorbed(error_on(one.fit.axis, chosen), own) for one in (less, final))
+        pairs.append((left, left + of_bodies @ change, after))
+    return all(_falls(left, by) >= NEARLY * _falls(left, after) for left, by, after in pairs)
 
 
 def _carried_by(dataset: Dataset) -> list[Body]:
@@ -100,23 +103,28 @@ def _carried_by(dataset: Dataset) -> list[Body]:
 
 
 def _of(bodies: Sequence[Body], less: Judged, logs: Sequence[PreparedLog]) -> Array:
-    """Change (n, 10 k) of the residual, N per accuracy of each parameter of k bodies."""
-    rows = (
-        np.hstack([body.forces(log) * ACCURACY * body.scale for body in bodies]) for log in logs
-    )
-    return np.concatenate([*rows])[moving(logs, sticks(less.fit.axis))]
+    """Change (n, 1 + 10 k) of the residual, N per unit of the rotor's inertia.
 
-
-def _step(columns: Array, of_bodies: Array, left: Array, final: Judged) -> Array:
-    """The change of a fit's parameters, and of bodies in units of accuracy, that leaves least.
-
-    Of the bodies each is as likely by itself as what the law leaves is of noise.
+    And per accuracy of each parameter of k bodies.
     """
-    weak = RIDGE * np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    prior = np.diag(np.concatenate([weak, np.full(of_bodies.shape[1], final.fit.error)]))
-    rows = np.concatenate([np.hstack([columns, of_bodies]), prior])
-    force = np.pad(-left, (0, len(prior)))
-    return np.asarray(np.linalg.lstsq(rows, force, rcond=None)[0], float)
+
+    def of(log: PreparedLog) -> Array:
+        each = (body.forces(log) * ACCURACY * body.scale for body in bodies)
+        return np.column_stack([-log.acceleration, *each])
+
+    return np.concatenate([of(log) for log in logs])[moving(logs, sticks(less.fit.axis))]
+
+
+def _within_accuracy(columns: Array, left: Array) -> Array:
+    """The changes (1 + 10 k,) of the rotor, and of bodies within a tenth, that leave least."""
+    from scipy.optimize import lsq_linear  # SciPy takes long to load
+
+    size = np.linalg.norm(columns, axis=0)
+    weak = np.diag(RIDGE * np.where(size > 0.0, size, 1.0))
+    rows = np.column_stack([np.concatenate([columns, weak]), np.pad(-left, (0, len(weak)))])
+    root = np.asarray(np.linalg.qr(rows, mode="r"))[:-1]  # as short as there are columns
+    most = np.concatenate([[np.inf], np.ones(len(size) - 1)])
+    return np.asarray(lsq_linear(root[:, :-1], root[:, -1], (-most, most)).x, float)
 
 
 def _falls(before: Array, after: Array) -> float:
