@@ -74,7 +74,7 @@ def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
 def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
     """The printed commands on short logs, with two effects to choose from and blank pictures."""
     rivals = ("cogging", "force_constant_ripple")
-    with in_small(*rivals, duration=3.0):
+    with in_small(*rivals, duration=2.0):
         assert_the_error_falls(lambda command: twin(*command[1:], folder=tmp_path), tmp_path)
 
 

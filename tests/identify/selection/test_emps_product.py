@@ -59,6 +59,7 @@ def added(found, emps):
     return add(CATALOGUE["asymmetric_friction"], found.fitted, *emps, test_function=WINDOW)
 
 
+@pytest.mark.slow
 def test_the_four_parameter_fit_is_near_the_published_one(found):
     axis = found.fitted.axes["x"]
     assert axis.mass == pytest.approx(95.1089, rel=0.015)

@@ -37,6 +37,7 @@ def test_a_log_at_another_length_is_as_if_it_was_prepared_so() -> None:
             np.testing.assert_allclose(one[:count], other[:count], atol=1e-9 * np.abs(other).max())
 
 
+@pytest.mark.slow
 def test_what_a_long_test_function_averages_away_is_found_by_a_short_one() -> None:
     assert "cogging" not in found().named
     told = found(SHORT)

@@ -108,6 +108,7 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
     assert mapped.replayed == pytest.approx(mapped.position_error[1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
     mapped: Addition,
 ) -> None:
