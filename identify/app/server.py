@@ -117,6 +117,13 @@ class Server:
         stamp = path.stat().st_mtime_ns if path.is_file() else None
         return JSONResponse(await self._answer(stamp, "import", name, "--guess"))
 
+    async def signals(self, request: Request) -> Response:
+        """What is in a log, with the course of each signal: `twin info LOG --json`."""
+        name = request.query_params.get("file", "")
+        path = inside(self.folder.root, name)
+        stamp = path.stat().st_mtime_ns if path.is_file() else None
+        return JSONResponse(await self._answer(stamp, "info", name))
+
     async def effects(self, request: Request) -> Response:
         """The catalogue: `twin effects --json`."""
         return JSONResponse(await self._answer(None, "effects"))
@@ -199,7 +206,8 @@ def application(server: Server, token: str, port: int) -> Starlette:
 
     get: Mapping[str, Callable[..., Any]] = {
         "/": static, "/static/{name}": static, "/api/state": server.state,
-        "/api/proposal": server.proposal, "/api/effects": server.effects,
+        "/api/proposal": server.proposal, "/api/signals": server.signals,
+        "/api/effects": server.effects,
         "/api/model": server.model, "/api/answer": server.answer,
         "/files/{path:path}": server.file,
     }  # fmt: skip

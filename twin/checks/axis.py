@@ -18,7 +18,7 @@ from twin.checks.explain import (
     find_trend,
     fit_dynamics,
 )
-from twin.checks.report import WHOLE, Fault, LogFinding, Severity
+from twin.checks.report import WHOLE, Fault, LogFinding, Place, Severity
 from twin.logs.log import AxisLog
 from twin.signals import Array, count_of, median, usual_size, white_noise
 
@@ -34,11 +34,11 @@ class Axis:
     sample_rate: float
     log: AxisLog
 
-    def error(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> LogFinding:
+    def error(self, fault: Fault, what: str, remedy: str, where: Place = WHOLE) -> LogFinding:
         """A fault for which the log should not be fitted."""
         return LogFinding(Severity.ERROR, fault, self.name, what, where, remedy)
 
-    def warning(self, fault: Fault, what: str, remedy: str, where: str = WHOLE) -> LogFinding:
+    def warning(self, fault: Fault, what: str, remedy: str, where: Place = WHOLE) -> LogFinding:
         """A fault that limits what a fit can identify."""
         return LogFinding(Severity.WARNING, fault, self.name, what, where, remedy)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from twin.checks.axis import Axis
 from twin.checks.explain import UNUSUAL, contradicted
-from twin.checks.report import Fault, LogFinding
+from twin.checks.report import Fault, LogFinding, Place
 from twin.signals import Array, stretches
 
 CLUSTER = 3  # samples between two jumps of one break
@@ -51,7 +51,7 @@ def check_breaks(axis: Axis) -> Iterator[LogFinding]:
             f"the position bends by up to {size} at {len(curved)} samples all over the log: the "
             "clock jitters, or samples are missing",
             "record with the drive's own clock, or import with the time stamps",
-            f"from {(curved[0] - 1) / axis.sample_rate:.6g} s",
+            Place((curved[0] - 1) / axis.sample_rate),
         )
         return
     breaks = find_breaks(axis)
@@ -179,13 +179,8 @@ def _finding(axis: Axis, fault: Fault, found: list[Break]) -> LogFinding:
         Fault.UNEVEN: "record with the drive's own clock",
     }.get(fault, "cut the log there, and check the encoder's connection")
     told = axis.error if fault in SPOILING else axis.warning
-    where = f"{first.first / axis.sample_rate:.6g} to {first.last / axis.sample_rate:.6g} s"
-    return told(fault, what, remedy, where + and_more(len(found)))
-
-
-def and_more(count: int) -> str:
-    """Behind the place of the first of so many."""
-    return f" and {count - 1} more times" if count > 1 else ""
+    spans = [(b.first / axis.sample_rate, b.last / axis.sample_rate) for b in found]
+    return told(fault, what, remedy, Place.first_of(spans))
 
 
 def uneven_curvature(axis: Axis) -> NDArray[np.intp]:
@@ -279,5 +274,5 @@ def pushes(force: Array, bad: NDArray[np.bool_], around: int) -> NDArray[np.bool
 def _outliers(axis: Axis, times: Array, what: str, remedy: str = CUT) -> LogFinding:
     bursts_apart = 0.05  # s without an outlier ends a burst
     bursts = np.split(times, np.flatnonzero(np.diff(times) > bursts_apart) + 1)
-    where = f"{bursts[0][0]:.6g} to {bursts[0][-1]:.6g} s{and_more(len(bursts))}"
+    where = Place.first_of([(b[0], b[-1]) for b in bursts])
     return axis.warning(Fault.OUTLIERS, what, remedy, where)

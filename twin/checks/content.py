@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.checks.axis import READINGS, Axis
-from twin.checks.breaks import and_more, held
-from twin.checks.report import WHOLE, Fault, LogFinding, Severity
+from twin.checks.breaks import held
+from twin.checks.report import WHOLE, Fault, LogFinding, Place, Severity
 from twin.signals import Array, stretches
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
@@ -33,7 +33,7 @@ def check_content(axis: Axis) -> Iterator[LogFinding]:
         if len(bad):
             what = f"{name} is not a finite number in {len(bad)} of {len(column)} samples"
             remedy = "cut the log there, or leave the signal out if it was not recorded"
-            where = f"from {bad[0] / axis.sample_rate:.6g} s"
+            where = Place(bad[0] / axis.sample_rate)
             yield axis.error(Fault.NOT_FINITE, what, remedy, where)
     yield from _unchanging(axis)
     slowest = 10.0  # Hz; no motion of an axis shows at fewer samples
@@ -240,7 +240,7 @@ def check_command(axis: Axis) -> Iterator[LogFinding]:
     single = [k for k in _single(off, least) if not axis.is_kicked(k, k)] if steps > least else []
     if single:
         what = f"single samples of the force are off by up to {off.max():.3g} {unit}"
-        where = f"{single[0] / axis.sample_rate:.6g} s{and_more(len(single))}"
+        where = Place.first_of([(k / axis.sample_rate, k / axis.sample_rate) for k in single])
         remedy = "repair these samples, or cut the log there"
         yield axis.warning(Fault.OUTLIERS, what, remedy, where)
     # noise that hides what the motion does not explain, even when it is averaged
@@ -305,7 +305,7 @@ def check_saturation(axis: Axis) -> Iterator[LogFinding]:
                 f"the force stays at its extreme of {extreme:.4g} {axis.log.kind.force} for "
                 f"{seconds:.3g} s in all",
                 "move more gently if the drive was at its limit, and record its actual force",
-                f"from {first:.6g} s",
+                Place(first),
             )
 
 

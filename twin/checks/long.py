@@ -11,10 +11,11 @@ import numpy as np
 
 from twin.checks import check_log
 from twin.checks.copies import COMPARED, Copy, copies
-from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
+from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Place, Severity
 from twin.checks.together import differences
 from twin.logs.decode import read_parts, require_intact, samples_by_axis
 from twin.logs.log import Log, in_multiples, joined, thinned
+from twin.signals import Array
 
 OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
 # Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
@@ -31,6 +32,13 @@ class CheckedPart:
     start: float
     stop: float
     report: CheckReport
+
+    def of_log(self, place: Place) -> Place:
+        """When it is in the log, of a place in the part."""
+        if place.start is None:
+            return Place(self.start, self.stop)
+        stop = None if place.stop is None else place.stop + self.start
+        return replace(place, start=place.start + self.start, stop=stop)
 
 
 def together(parts: Sequence[CheckedPart]) -> CheckReport:
@@ -57,10 +65,7 @@ def _said(seen: Sequence[tuple[CheckedPart, LogFinding]], parts: int) -> LogFind
     part, first = next(((p, f) for p, f in seen if f.severity is told), seen[0])
     if first.where == WHOLE and len(seen) == parts:
         return first
-    place = f"{part.start:g} to {part.stop:g} s"
-    where = place if first.where == WHOLE else f"{first.where} into the part from {place}"
-    more = len(seen) - 1
-    return replace(first, where=where + (f", and in {more} other parts" if more else ""))
+    return replace(first, where=replace(part.of_log(first.where), parts=len(seen) - 1))
 
 
 def check_file(path: Path) -> CheckReport:
@@ -148,12 +153,24 @@ def _thinned(parts: Iterable[Log], every: int) -> Iterator[Log]:
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal of an axis with its unit, its least and its largest value."""
+    """A signal of an axis with its unit.
+
+    course (2 k,): least and largest value of k parts of the log of one length, in turn.
+    """
 
     name: str
     unit: str
-    least: float
-    most: float
+    course: Array
+
+    @property
+    def least(self) -> float:
+        """Its least value."""
+        return float(self.course.min())
+
+    @property
+    def most(self) -> float:
+        """Its largest value."""
+        return float(self.course.max())
 
 
 @dataclass(frozen=True)
@@ -185,18 +202,25 @@ def log_info(path: str | Path) -> LogInfo:
     """What is in a log, which is read part by part. Raises InputError where it cannot be read."""
     samples = 0
     reports: list[CheckedPart] = []
-    ranges: dict[tuple[str, str], tuple[float, float]] = {}
+    seen: dict[tuple[str, str], list[Array]] = {}
     for part in _checked(_parts(Path(path)), reports):
         samples += len(part)
         for axis, own in part.axes.items():
             for name, column in own.columns.items():
-                low, high = ranges.get((axis, name), (np.inf, -np.inf))
-                ranges[axis, name] = min(low, float(column.min())), max(high, float(column.max()))
+                seen.setdefault((axis, name), []).append(_envelope(column))
     axes = {}
     for axis, own in part.axes.items():
-        channels = tuple(Channel(n, own.unit(n), *ranges[axis, n]) for n in own.columns)
+        whole = {n: _envelope(np.concatenate(seen[axis, n])) for n in own.columns}
+        channels = tuple(Channel(n, own.unit(n), course) for n, course in whole.items())
         constant = own.force_constant
         stated = None if constant is None else (constant, own.kind("N/A"))
         axes[axis] = AxisInfo(own.kind.kind, channels, stated)
     metadata = {name: value for name, value in part.metadata.items() if name not in OWN}
     return LogInfo(samples, part.sample_rate, axes, metadata, together(reports))
+
+
+def _envelope(column: Array, parts: int = 100) -> Array:
+    """Least and largest value (2 k,) of so many parts of a column (n,), in turn."""
+    begun = np.unique(np.linspace(0, len(column), parts, endpoint=False).astype(int))
+    ends = (np.minimum.reduceat(column, begun), np.maximum.reduceat(column, begun))
+    return np.stack(ends, axis=1).ravel()

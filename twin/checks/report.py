@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-
-WHOLE = "whole log"
 
 
 class Severity(Enum):
@@ -46,6 +45,42 @@ class Fault(Enum):
 
 
 @dataclass(frozen=True)
+class Place:
+    """When a fault is seen in a log.
+
+    start: s; None: in all of it. stop: s; None: from the start on. more: how many times more after
+    that; parts: in how many other parts of a long log.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    more: int = 0
+    parts: int = 0
+
+    @classmethod
+    def first_of(cls, spans: Sequence[tuple[float, float]]) -> Place:
+        """The first of some spans of time, s, and how many more there are."""
+        return cls(*spans[0], more=len(spans) - 1)
+
+    def __str__(self) -> str:
+        more = f" and {self.more} more times" if self.more else ""
+        parts = f", and in {self.parts} other parts" if self.parts else ""
+        return f"{self._first}{more}{parts}"
+
+    @property
+    def _first(self) -> str:
+        if self.start is None:
+            return "whole log"
+        if self.stop is None:
+            return f"from {self.start:.6g} s"
+        same = self.stop == self.start
+        return f"{self.start:.6g} s" if same else f"{self.start:.6g} to {self.stop:.6g} s"
+
+
+WHOLE = Place()
+
+
+@dataclass(frozen=True)
 class LogFinding:
     """One fault of one axis: what and where with numbers and units, and the remedy."""
 
@@ -53,7 +88,7 @@ class LogFinding:
     fault: Fault
     axis: str
     what: str
-    where: str
+    where: Place
     remedy: str
 
     def __str__(self) -> str:

@@ -40,8 +40,8 @@ export function frames(place, file, title) {
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A small plot of a column. */
-export function course(values, name) {
+/** A small plot of a column. marks: [from, to] of its length, 0 to 1, where something is wrong. */
+export function course(values, name, marks = []) {
   const low = Math.min(...values), span = Math.max(...values) - low || 1;
   const steps = values.map((v, k) => `${(k / Math.max(values.length - 1, 1) * 102 + 1).toFixed(1)},` +
     `${(28 - (v - low) / span * 26).toFixed(1)}`);
@@ -51,6 +51,12 @@ export function course(values, name) {
   made.setAttribute("role", "img");
   made.setAttribute("aria-label", `course of ${name}`);
   path.setAttribute("d", `M${steps.join(" L")}`);
+  for (const [from, to] of marks) {
+    const mark = document.createElementNS(SVG, "rect"), width = Math.max(2, (to - from) * 102);
+    const sides = { class: "mark", x: Math.min(1 + from * 102, 103 - width), y: 0, width, height: 30 };
+    for (const [key, value] of Object.entries(sides)) mark.setAttribute(key, value);
+    made.append(mark);
+  }
   made.append(path);
   return made;
 }

@@ -23,8 +23,8 @@ export const recordings = {
     const jobs = state.jobs.filter(j => ["import", "check", "cut"].includes(j.words[0])).map(j => [j.number, j.state]);
     const open = state.files.filter(f => !f.taken).map(f => f.name);
     const check = last(state, "check");
-    put(this.list, [state.recordings, check, proofs, jobs], () => state.recordings.length ? listOf(state, check) : []);
-    for (const r of state.recordings) proofOf(state, r);
+    put(this.list, [state.recordings, check, proofs, signals, jobs], () => state.recordings.length ? listOf(state, check) : []);
+    for (const r of state.recordings) { proofOf(state, r); signalsOf(r); }
     findingsOf(check);
     const there = state.files.find(f => f.name === this.chosen);
     if (!there || (there.taken && !this.again)) this.choose(open[0] ?? null, false);
@@ -119,6 +119,7 @@ export const recordings = {
     const wanted = sets.length ? sets.flatMap(e => ["--set", e]) : ["--yes"];
     const old = this.again ? stateNow().recordings.find(r => r.sources.includes(first))?.map : null;
     if (!await finished("import", first, ...(old && sets.length ? ["--map", old] : []), ...wanted)) return;
+    for (const file of Object.keys(signals)) delete signals[file];  // it may be another under its name
     this.choose(null);
     const made = (await get("/api/state")).recordings.find(r => r.sources.includes(first));
     for (const name of rest) if (made?.map) await run("import", name, "--map", made.map);
@@ -161,7 +162,8 @@ async function take(files) {
 }
 
 // --- what is taken in --------------------------------------------------------------------------------
-const proofs = {}, faults = { file: null, logs: {} };
+const proofs = {}, faults = { file: null, logs: {} }, signals = {};  // signals: of the logs as they are
+const DRAWN = ["position", "force", "current"];
 
 function proofOf(state, recording) {
   if (recording.file in proofs) return;
@@ -178,12 +180,12 @@ function findingsOf(check) {
 }
 
 function listOf(state, check) {
-  return [h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
+  return [h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "Course", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
     h("tbody", {}, ...state.recordings.map((r, k) => h("tr", {},
       h("td", {}, h("b", {}, r.sources[0] ?? r.file), h("div", { class: "soft" }, r.sources.length ? r.file : "")),
       h("td", {}, h("select", { id: `role-${k}`, "aria-label": `role of ${r.file}`, onchange: e => run("project", "role", r.file, "--to", e.target.value) },
         ...ROLES.map(role => h("option", { value: role, selected: role === r.role }, role)))),
-      h("td", {}, ...physicsOf(r)), h("td", {}, ...checkOf(r, check)),
+      h("td", { class: "plot" }, ...coursesOf(r)), h("td", {}, ...physicsOf(r)), h("td", {}, ...checkOf(r, check)),
       h("td", {}, h("div", { class: "row" }, r.sources.length === 1 ? h("button", { "aria-label": `Change the map of ${r.sources[0]}`,
         onclick: () => recordings.choose(r.sources[0], true, true) }, "Map") : null,
       h("button", { "aria-label": `Leave ${r.file} out`, onclick: () => run("project", "leave", r.file) }, "Leave out")))))))),
@@ -206,13 +208,32 @@ function checkOf(recording, check) {
   if (!check || !found) return [h("span", { class: "soft" }, "not checked")];
   if (!found.length) return [h("span", { class: "good-text" }, "fit for identification")];
   return found.map(f => h("details", {}, h("summary", { class: f.severity === "error" ? "warn-text" : "" }, `${f.severity}: ${f.fault.replaceAll("_", " ")}`),
-    h("p", {}, `${f.what}; ${f.where}`), h("p", {}, f.remedy), cutOf(recording, f.where)));
+    h("p", {}, `${f.what}; ${f.where}`), h("p", {}, f.remedy), cutOf(recording, f)));
 }
 
-function cutOf(recording, where) {
-  const times = [...where.matchAll(/(\d+(?:\.\d+)?)\s*(?:s\b|to\b)/g)].map(m => m[1]);
-  if (!times.length) return null;
-  const from = h("input", { size: 6, "aria-label": "from, s", value: "0" }), to = h("input", { size: 6, "aria-label": "to, s", value: times[0] });
+/** The longer part of a recording, before or behind a fault, as a recording of its own. */
+function cutOf(recording, fault) {
+  if (fault.start === null) return null;
+  const end = signals[recording.file]?.duration ?? Infinity, behind = fault.stop !== null && end - fault.stop > fault.start;
+  const [first, last] = behind ? [fault.stop, end] : [0, fault.start];
+  const from = h("input", { size: 6, "aria-label": "from, s", value: short(first) }), to = h("input", { size: 6, "aria-label": "to, s", value: short(last) });
   return h("div", { class: "row" }, "Keep from", from, "s to", to, "s",
     h("button", { onclick: () => run("cut", recording.file, "--from", from.value, "--to", to.value) }, "Cut here"));
+}
+
+/** The course of a recording, with the faults of the check as marks. */
+function coursesOf(recording) {
+  const log = signals[recording.file];
+  return Object.entries(log?.axes ?? {}).flatMap(([axis, own]) => {
+    const seen = (faults.logs[recording.file] ?? []).filter(f => f.axis === axis && f.start !== null);
+    const marks = seen.map(f => [f.start, f.stop ?? log.duration].map(t => t / log.duration));
+    return DRAWN.filter(name => own.channels[name]).slice(0, 2).map(name => h("div", { title: `${name} of axis ${axis} over ${short(log.duration)} s` },
+      course(own.channels[name].course, `${name} of axis ${axis}, ${marks.length} faults marked`, marks)));
+  });
+}
+
+function signalsOf(recording) {
+  if (signals[recording.file]) return;
+  signals[recording.file] = {};
+  get(`/api/signals?file=${encodeURIComponent(recording.file)}`).then(a => { signals[recording.file] = Object.values(a.logs ?? {})[0] ?? {}; redraw(); }).catch(() => {});
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import field_validator
+from pydantic import BeforeValidator, field_validator
 
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, read
 
@@ -91,7 +91,11 @@ class CheckFindingEntry(Entry):
     fault: Annotated[str, LOWER] = read("fault.name")
     axis: str
     what: str
-    where: str
+    where: Annotated[str, BeforeValidator(str)]
+    start: Number = read("where.start")
+    """s, from which on it is seen first; null in all of the log."""
+    stop: Number = read("where.stop")
+    """s, until which; null to the end."""
     remedy: str
 
 
@@ -109,11 +113,13 @@ def check_answer(reports: Mapping[str, CheckReport]) -> CheckAnswer:
 
 
 class ChannelEntry(Entry):
-    """The range of a signal."""
+    """The range of a signal, and its course."""
 
     unit: str
     least: Number
     most: Number
+    course: list[Number]
+    """Least and largest value of parts of the log of one length, in turn: what it looks like."""
 
 
 class AxisInfoEntry(Entry):

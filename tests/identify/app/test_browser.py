@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from app_runs import browsed, served
 from arms import ARM, arm_log
+from check_drive import drive
 from cli_runs import twin
 
 from identify.project.folder import Folder
-from twin.logs import write_log
+from twin.logs import read_log, write_log
 
 
 def recorded(path: Path, rate: float, seed: int, seconds: int = 6) -> Path:
@@ -161,3 +162,32 @@ def test_a_mechanism_is_taken_in_with_its_file_and_its_body_is_corrected(tmp_pat
     assert all(e.after < 0.1 * e.before for e in model.errors)
     mass = mujoco.MjModel.from_xml_path(str(folder / "models/2.xml")).body("fore").mass[0]
     assert mass == pytest.approx(2.5, rel=0.01)
+
+
+@pytest.mark.slow  # a browser and a server
+def test_a_fault_is_marked_on_the_course_of_a_recording_and_cut_off_there(tmp_path):
+    """The position goes on elsewhere after 5 s, so the longer part is kept."""
+
+    def stepped(columns):
+        columns["position"][5000:] += 0.02
+
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    write_log(drive(seconds=8.0, change=stepped), tmp_path / "run.mcap")
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", str(tmp_path / "run.mcap"))
+        page.click("#take")
+        page.wait_for_selector("svg.course >> nth=1")
+        assert page.query_selector(".mark") is None
+        page.click("#check")
+        mark = page.wait_for_selector("svg.course .mark")
+        assert 62.0 < float(mark.get_attribute("x")) < 66.0  # 5 of 8 s of a plot that is 104 wide
+        page.click("td >> text=error")
+        if place := os.environ.get("SHOT"):
+            page.screenshot(path=place)
+        page.click("text=Cut here")
+        page.wait_for_selector(".mark", state="detached")
+    kept = read_log(folder / Folder(folder).read().recordings[0].file)
+    assert 4.9 < len(kept) * kept.period < 5.1

@@ -31,6 +31,7 @@ from identify.results.results import CorrectedBody
 from identify.selection.diagnosis import Verdict
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, LogFinding, Severity
+from twin.checks.report import Place
 from twin.curve import Coordinate
 from twin.laws import verdict
 
@@ -60,7 +61,9 @@ def laws() -> Answer:
 
 
 def check() -> Answer:
-    finding = LogFinding(Severity.ERROR, Fault.LAG, "y", "the what", "the where", "the remedy")
+    finding = LogFinding(
+        Severity.ERROR, Fault.LAG, "y", "the what", Place(1.5, 2.0, 3), "the remedy"
+    )
     mild = replace(finding, severity=Severity.WARNING, fault=Fault.SIGN, axis="x")
     assert check_answer({"a": CheckReport((mild,))}).ok
     return check_answer({"a": CheckReport((finding, mild)), "b": CheckReport(())})

@@ -30,6 +30,7 @@ from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, LogFinding, Severity
+from twin.checks.report import Place
 from twin.curve import Coordinate
 from twin.laws import verdict
 from twin.model.machine import Hindrance
@@ -131,7 +132,7 @@ LAWS = [
         "b", (replace(LAW, holds=False, fault="off by 3"), replace(LAW, holds=None, fault="later"))
     ),
 ]
-LATE = LogFinding(Severity.WARNING, Fault.LAG, "y", "the what", "the where", "the remedy")
+LATE = LogFinding(Severity.WARNING, Fault.LAG, "y", "the what", Place(1.5, 2.0, 3), "the remedy")
 
 TEXTS: dict[str, Callable[[], object]] = {
     "fit": made.fit_result,

@@ -217,7 +217,7 @@ def test_numbers_that_are_none_are_counted_and_placed(name, places):
     (found,) = check_log(log).findings
     assert found.fault is Fault.NOT_FINITE
     assert found.what == (f"{name} is not a finite number in {len(places)} of 4000 samples")
-    assert found.where == f"from {places[0] / 1000.0:g} s"
+    assert str(found.where) == f"from {places[0] / 1000.0:g} s"
 
 
 @pytest.mark.parametrize(

@@ -225,7 +225,8 @@ def test_clean_logs_are_called_clean() -> None:
             log = simulate(stage(), experiment, seed=200 + seed, duration=8.0)
             for columns in COLUMN_SETS.values():
                 wrong += [str(f) for f in check_log(log.with_fields(columns)).findings]
-    assert not [w for w in wrong if "hardly moves" not in w and "moves only" not in w]
+    motions = ("hardly moves", "moves only", "strokes only")  # which tell little, and say so
+    assert not [w for w in wrong if not any(m in w for m in motions)]
 
 
 def burst(shape: Array) -> Callable[[Columns], Columns]:
@@ -242,7 +243,7 @@ def test_a_burst_of_little_noise_is_told_where_it_is() -> None:
     noise = 1e-6 * np.random.default_rng(0).standard_normal(100)
     finding = only(check_log(with_axis(clean_log(), "y", burst(noise))), Fault.OUTLIERS)
     assert finding.what.startswith("position bends by up to")
-    start, end = (float(w) for w in finding.where.removesuffix(" s").split(" to "))
+    start, end = (float(w) for w in str(finding.where).removesuffix(" s").split(" to "))
     assert (start, end) == (pytest.approx(3.0, abs=0.011), pytest.approx(3.01, abs=0.011))
 
 
