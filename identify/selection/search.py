@@ -47,6 +47,7 @@ from identify.selection.trying import (
 )
 from twin.effect import Kind
 from twin.effects import Catalogue
+from twin.model.machine import AxisModel
 from twin.parallel import Progress, silent, within
 from twin.threads import trim_memory
 
@@ -390,9 +391,7 @@ def _less_replaced(
     judged: Judged, steps: tuple[Step, ...], first: Judged
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without those about a friction in whose place it has another by now."""
-    axis = judged.fit.axis
-    rubs = axis.friction is not None
-    gone = [s for s in steps if rubs and _rubs(s.change) and s.change.name not in axis.names]
+    axis, gone = judged.fit.axis, replaced(judged.fit.axis, steps)
     for step in gone:
         axis = step.change.undone(axis, first.fit.axis) or axis
     if axis is not judged.fit.axis:
@@ -400,6 +399,12 @@ def _less_replaced(
     *kept, last = (s for s in steps if s not in gone)
     dropped = (*last.dropped, *dict.fromkeys(s.change.name for s in gone))
     return judged, (*kept, replace(last, dropped=dropped))
+
+
+def replaced(axis: AxisModel, steps: Sequence[Step]) -> list[Step]:
+    """The steps about a friction in whose place an axis has another."""
+    own = axis.friction is not None
+    return [s for s in steps if own and _rubs(s.change) and s.change.name not in axis.names]
 
 
 def _rubs(change: Change) -> bool:

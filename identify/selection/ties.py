@@ -16,7 +16,7 @@ from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.candidates import candidate_of, doubt
 from identify.selection.changes import Added, Screening
-from identify.selection.search import Found, Step, is_tied, simplest
+from identify.selection.search import Found, Step, is_tied, replaced, simplest
 from identify.selection.trying import Tried, fitted_anew, parameters, refitted_on
 from twin.effect import Kind
 from twin.model.machine import AxisModel, Fitted
@@ -30,7 +30,8 @@ def with_ties(found: Found) -> Found:
     Where the logs ask for a rival rather than for what was found, it takes its place.
     """
     for step in found.steps:
-        if step.tied or _others_alike(step, found):
+        there = any(s is step for s in found.steps)  # it may have gone with a law that was replaced
+        if there and (step.tied or _others_alike(step, found)):
             found = _compared_again(step, found)
     return found
 
@@ -56,19 +57,21 @@ def _compared_again(step: Step, found: Found) -> Found:
         return _with_step(found, step, replace(step, tied=others), final)
     leader = replace(leader, judged=fitted_anew(leader.judged))
     led = _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
-    return _less_changes_of(step.change.name, led)
+    return _less_replaced(step.change.name, led)
 
 
-def _less_changes_of(name: str, found: Found) -> Found:
-    """What was found without other changes of a law that has gone: they were no other law's."""
-    gone = [s for s in found.steps if s.change.name == name]
+def _less_replaced(name: str, found: Found) -> Found:
+    """What was found without other changes of a law that has gone: they were no other law's.
+
+    And of a friction that has gone with it, as a friction takes the place of any other.
+    """
     axis = found.final.fit.axis
+    others = replaced(axis, found.steps)
+    gone = [s for s in found.steps if s.change.name == name or s in others]
     for step in reversed(gone):
         axis = step.change.undone(axis, found.base.fit.axis) or axis
-    if axis is found.final.fit.axis:
-        return found
-    kept = tuple(s for s in found.steps if s not in gone)
-    return replace(found, steps=kept, final=refitted_on(axis, found.final))
+    final = found.final if axis is found.final.fit.axis else refitted_on(axis, found.final)
+    return replace(found, steps=tuple(s for s in found.steps if s not in gone), final=final)
 
 
 def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from planted_logs import SLIDE, Ride, begun, few, having, logged
 
+from identify.selection.changes import Added, Reshaped
 from identify.selection.search import search
 from identify.selection.ties import with_ties
 
@@ -20,3 +21,21 @@ def test_the_simpler_of_two_leads_unless_it_was_doubted() -> None:
     assert [s.change.name for s in with_ties(found).steps] == ["dahl"]
     doubted = replace(found, barred=frozenset({"dahl"}))
     assert [s.change.name for s in with_ties(doubted).steps] == ["lugre"]
+
+
+def test_another_shape_goes_with_the_friction_that_it_was_of() -> None:
+    """A friction that takes the place of a force takes that of the friction beside it as well."""
+    machine = having(
+        replace(SLIDE, effects=()), "lugre",
+        Fc=0.8, Fs=1.6, v0=0.02, sigma0=2000.0, sigma1=1.0, sigma2=0.5,
+    )  # fmt: skip
+    fit, dataset = begun(SLIDE, *({f"{i}": logged(machine, Ride(i, 5.0))} for i in (1, 2)))
+    (rival,) = search(fit, dataset, few("lugre")).steps
+    found = search(fit, dataset, few("presliding_hysteresis"))
+    assert {type(s.change) for s in found.steps} == {Added, Reshaped}
+    steps = tuple(
+        replace(s, tied=(rival.tried,)) if isinstance(s.change, Added) else s for s in found.steps
+    )
+    told = with_ties(replace(found, steps=steps))
+    assert [s.change.name for s in told.steps] == ["lugre"]
+    assert told.final.fit.axis.names == ("lugre",)
