@@ -179,8 +179,26 @@ function findingsOf(check) {
   get(`/api/answer?file=${encodeURIComponent(check.file)}`).then(a => { faults.logs = a.logs ?? {}; proofs[check.file] = 1; redraw(); }).catch(() => {});
 }
 
+/** The recordings by what they are for, each to be dragged elsewhere; the table has the same for the keyboard. */
+function rolesOf(state) {
+  return h("div", { class: "roles" }, ...ROLES.map(role => {
+    const own = state.recordings.filter(r => r.role === role);
+    const zone = h("div", { id: `drop-${role}`, class: "role" }, h("b", {}, role),
+      ...own.map(r => h("span", { class: "chip", draggable: "true", ondragstart: e => { e.dataTransfer.setData("text/plain", r.file); } }, r.sources[0] ?? r.file)));
+    zone.ondragover = event => { event.preventDefault(); zone.classList.add("over"); };
+    zone.ondragleave = () => zone.classList.remove("over");
+    zone.ondrop = event => {
+      event.preventDefault();
+      zone.classList.remove("over");
+      const file = event.dataTransfer.getData("text/plain");
+      if (state.recordings.some(r => r.file === file && r.role !== role)) run("project", "role", file, "--to", role);
+    };
+    return zone;
+  }));
+}
+
 function listOf(state, check) {
-  return [h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "Course", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
+  return [state.recordings.length > 1 ? rolesOf(state) : null, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "Course", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
     h("tbody", {}, ...state.recordings.map((r, k) => h("tr", {},
       h("td", {}, h("b", {}, r.sources[0] ?? r.file), h("div", { class: "soft" }, r.sources.length ? r.file : "")),
       h("td", {}, h("select", { id: `role-${k}`, "aria-label": `role of ${r.file}`, onchange: e => run("project", "role", r.file, "--to", e.target.value) },

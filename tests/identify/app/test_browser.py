@@ -191,3 +191,25 @@ def test_a_fault_is_marked_on_the_course_of_a_recording_and_cut_off_there(tmp_pa
         page.wait_for_selector(".mark", state="detached")
     kept = read_log(folder / Folder(folder).read().recordings[0].file)
     assert 4.9 < len(kept) * kept.period < 5.1
+
+
+@pytest.mark.slow  # a browser and a server
+def test_a_recording_is_dragged_to_another_role(tmp_path):
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    for name in ("a.mcap", "b.mcap", "c.mcap"):
+        write_log(drive(seconds=3.0), tmp_path / name)
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", [str(tmp_path / f"{n}.mcap") for n in "abc"])
+        page.click("#take")
+        page.wait_for_selector("#drop-test >> text=c.mcap")
+        page.drag_and_drop("#drop-test >> text=c.mcap", "#drop-training")
+        page.wait_for_selector("#drop-training >> text=c.mcap")
+        if place := os.environ.get("SHOT"):
+            page.wait_for_selector("svg.course >> nth=5")
+            page.screenshot(path=place)
+        page.click("#undo")
+        page.wait_for_selector("#drop-test >> text=c.mcap")
+    assert [r.role for r in Folder(folder).read().recordings] == ["training", "selection", "test"]
