@@ -33,6 +33,7 @@ CATALOGUE = load_catalogue()
 BODY, ROTOR, GAIN, LOADED = "link_mass", "rotor_inertia", "torque_constant", "joint_load_friction"
 SPRINGS, FRICTION = ("spring", "gravity"), "coulomb_viscous"
 RECORDED = "recording"
+UPRIGHT = "0 0 1"  # an axis about which no weight turns
 KNOWN = (*RUBS, "encoder_quantization", "coulomb_viscous")
 CHANGES = (
     ("payload",), (), ("rotor",), ("gain",), ("mass", "spring"), ("load",), ("weightless",), (),
@@ -65,21 +66,23 @@ def machine(seed: int, number: int) -> Machine:
     changed, right = Changed(), list[tuple[Told, ...]]()
     for what in CHANGES[number % len(CHANGES)]:
         changed, told = _change(what, arm, changed, rng)
-        right.append(told)
+        right += [told] if told else []
     return Machine(number, arm, changed, tuple(right))
 
 
 def _change(
     what: str, arm: Arm, changed: Changed, rng: np.random.Generator
 ) -> tuple[Changed, tuple[Told, ...]]:
-    """One thing more that is changed of an arm, and the answers that are right of it."""
+    """One thing more that is changed of an arm, and what is right of it; nothing if none feels it."""
     i = int(rng.integers(len(arm.mass)))
     joint, link = arm.joints[i], arm.links[i]
     if what == "payload":
         more = float(arm.mass[-1] * rng.uniform(0.2, 0.6))
         return replace(changed, payload=more), ((BODY, arm.links[-1]),)
     if what == "weightless":
-        return replace(changed, weightless=True), ((RECORDED, "weight"),)
+        turns = zip(arm.slides, arm.axes, strict=True)
+        felt = any(not slide and axis != UPRIGHT for slide, axis in turns)  # else it is an offset
+        return replace(changed, weightless=True), ((RECORDED, "weight"),) if felt else ()
     level = float(arm.coulomb[i])
     size, told = {
         "mass": (float(arm.mass[i] * rng.uniform(0.2, 0.4)), ((BODY, link),)),
