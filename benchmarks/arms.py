@@ -73,7 +73,7 @@ def machine(seed: int, number: int) -> Machine:
 def _change(
     what: str, arm: Arm, changed: Changed, rng: np.random.Generator
 ) -> tuple[Changed, tuple[Told, ...]]:
-    """One thing more that is changed of an arm, and what is right of it; nothing if none feels it."""
+    """One thing more that is changed of an arm, and what is right of it; nothing if unfelt."""
     i = int(rng.integers(len(arm.mass)))
     joint, link = arm.joints[i], arm.links[i]
     if what == "payload":
