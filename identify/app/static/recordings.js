@@ -232,7 +232,7 @@ function checkOf(recording, check) {
 /** The longer part of a recording, before or behind a fault, as a recording of its own. */
 function cutOf(recording, fault) {
   if (fault.start === null) return null;
-  const end = signals[recording.file]?.duration ?? Infinity, behind = fault.stop !== null && end - fault.stop > fault.start;
+  const end = signals[recording.file]?.duration ?? 0, behind = fault.stop !== null && end - fault.stop > fault.start;
   const [first, last] = behind ? [fault.stop, end] : [0, fault.start];
   const from = h("input", { size: 6, "aria-label": "from, s", value: short(first) }), to = h("input", { size: 6, "aria-label": "to, s", value: short(last) });
   return h("div", { class: "row" }, "Keep from", from, "s to", to, "s",
