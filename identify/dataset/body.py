@@ -20,6 +20,9 @@ from twin.signals import Array
 if TYPE_CHECKING:
     from twin.mujoco.mechanism import Mechanism
 
+# Relative, of what a file says of masses, centres and torque constants: two models of one machine
+# by its own makers differ by as much.
+ACCURACY = 0.1
 LINK_MASS = "link_mass"  # by which `twin add` knows it, as it knows an effect by its name
 INERTIAL = {
     "mass": "kg", "first moment x": "kg m", "first moment y": "kg m", "first moment z": "kg m",

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,11 @@ class _Rows:
     time: Array
     size: Array
     kept: NDArray[np.bool_]
+
+    @cached_property
+    def every(self) -> Array:
+        """The columns (n, k + 3) of the model, then of the recording."""
+        return np.column_stack([self.columns, self.recorded])
 
 
 def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
@@ -200,7 +206,7 @@ def _gains(
 
     And the sum of squares of each. among: which rows are asked.
     """
-    columns = np.column_stack([own.columns, own.recorded])[among]
+    columns = own.every[among]
     size = np.sum(columns**2, axis=0)
     return columns.T @ left[among] / np.where(size > 0.0, size, np.inf), size
 
@@ -209,8 +215,8 @@ def _usual(at: int, own: _Rows, value: float, where: Sequence[ParameterReference
     """The gain of a column that its value is, or the command, where it may have either sign."""
     if at < len(where) and where[at].parameter.lower >= 0.0:
         return abs(value) * float(own.size[at])
-    column = np.column_stack([own.columns, own.recorded])[:, at]
-    return float(np.linalg.norm(own.log.command[own.kept]) / (np.linalg.norm(column) or np.inf))
+    size = np.linalg.norm(own.every[:, at]) or np.inf
+    return float(np.linalg.norm(own.log.command[own.kept]) / size)
 
 
 def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identify.dataset.body import Body
+from identify.dataset.body import ACCURACY, Body
 from identify.dataset.dataset import Dataset
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
@@ -202,8 +202,7 @@ class _Told:
 
 def _beside_gains(regression: Regression, asked: Sequence[int]) -> Solution | None:
     """The same beside the torque constants of all joints; None where the logs ask for none."""
-    accuracy = 0.1  # relative: two papers of one machine, by its makers, differ by as much
-    known = np.full(1, accuracy)
+    known = np.full(1, ACCURACY)
     groups = [replace(g, scale=known) if g.what is What.GAIN else g for g in regression.groups]
     free = replace(regression, groups=groups)
     gains = [i for i, g in enumerate(groups) if g.what is What.GAIN and i not in asked]

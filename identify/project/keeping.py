@@ -137,9 +137,9 @@ def _fitted(answer: Answer) -> Iterator[ErrorsEntry]:
 
 
 def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
-    steps = answer.get("steps") or [answer]
     if "body" in answer:
         return _corrected(given, answer)
+    steps = answer.get("steps") or [answer]
     changes = [
         f"body {step['effect']}" if step["action"] == "body" else step["effect"]
         for step in steps

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.body import ACCURACY
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import noise_beside
@@ -185,12 +186,8 @@ def _is_of(force: Array, columns: Array) -> bool:
     return float(left @ left) < SAME_FORCE * float(force @ force)
 
 
-def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -> bool:
-    """Whether most of a joint's force is what its bodies take, times less than their accuracy.
-
-    Masses and centres of a file, and the torque constants of motors, are seldom better than a
-    tenth: two models of one machine by its own makers differ by as much.
-    """
+def _is_of_the_file(alone: AxisModel, dataset: Dataset) -> bool:
+    """Whether most of a joint's force is what its bodies take, times less than their accuracy."""
     if any(log.motion.bodies is None for log in dataset.training):
         return False
     force = averaged_force(alone, dataset.training)
@@ -199,7 +196,7 @@ def _is_of_the_file(alone: AxisModel, dataset: Dataset, accuracy: float = 0.1) -
     if not load.any():
         return False
     part = float(load @ force) / float(load @ load)
-    return abs(part) < accuracy and _is_of(force, load[:, None])
+    return abs(part) < ACCURACY and _is_of(force, load[:, None])
 
 
 def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:

@@ -1,8 +1,7 @@
 """Whether other bodies or another rotor explain what a law of one joint of a mechanism does.
 
-Masses and centres of a file are seldom better than a tenth: two models of one machine by its own
-makers differ by as much. And those that logs corrected are as good as what was known of the joints
-by then. What a joint lacks is judged beside them.
+Masses and centres of a file are seldom exact, and those that logs corrected are as good as what was
+known of the joints by then. What a joint lacks is judged beside them.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from enum import Enum
 
 import numpy as np
 
-from identify.dataset.body import LINK_MASS, Body
+from identify.dataset.body import ACCURACY, LINK_MASS, Body
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.errors import error_on
@@ -24,8 +23,6 @@ from identify.selection.search import NEARLY
 from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.signals import Array
-
-ACCURACY = 0.1  # relative, of an inertial parameter
 
 
 class What(Enum):
@@ -74,23 +71,25 @@ def is_of_bodies(less: Judged, final: Judged, effect: Effect) -> bool:
     friction, which turns with the velocity, is none, and of what is asked of all joints at once it
     is known.
     """
-    bodies = _carried_by(less.dataset)
-    known = effect.kind is Kind.FRICTION or any(what.covers(effect) for what in What)
-    if known or not bodies:
+    if effect.kind is Kind.FRICTION or any(what.covers(effect) for what in What):
+        return False
+    if not (bodies := _carried_by(less.dataset)):
         return False
     fit, chosen = less.fit, less.dataset.selection
-    own, given = fit.basis, less.dataset.training
-    of_bodies = unabsorbed(_of(bodies, less, given), own)
-    left, after = (unabsorbed(one.fit.residual, own) for one in (less, final))
-    change = _within_accuracy(of_bodies, left)
-    pairs = [(left, left + of_bodies @ change, after)]
+    groups = [(less.dataset.training, fit.basis, fit.residual, final.fit.residual)]
     if chosen:
-        rows = moving(chosen, sticks(fit.axis))
-        own = orthonormal(jacobian(fit.axis, chosen, fit.scaling.where)[rows])
-        of_bodies = unabsorbed(_of(bodies, less, chosen), own)
-        left, after = (unabsorbed(error_on(one.fit.axis, chosen), own) for one in (less, final))
-        pairs.append((left, left + of_bodies @ change, after))
-    return all(_falls(left, by) >= NEARLY * _falls(left, after) for left, by, after in pairs)
+        columns = jacobian(fit.axis, chosen, fit.scaling.where)[moving(chosen, sticks(fit.axis))]
+        left, after = (error_on(one.fit.axis, chosen) for one in (less, final))
+        groups.append((chosen, orthonormal(columns), left, after))
+    asked = [
+        tuple(unabsorbed(force, own) for force in (_of(bodies, less, logs), left, after))
+        for logs, own, left, after in groups
+    ]
+    change = _within_accuracy(*asked[0][:2])
+    return all(
+        _falls(left, left + columns @ change) >= NEARLY * _falls(left, after)
+        for columns, left, after in asked
+    )
 
 
 def _carried_by(dataset: Dataset) -> list[Body]:

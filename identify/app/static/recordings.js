@@ -145,9 +145,14 @@ function dropZone() {
   const input = h("input", { id: "files", type: "file", multiple: true, onchange: e => take([...e.target.files]).then(() => { e.target.value = ""; }) });
   const zone = h("div", { class: "drop" }, h("label", { for: "files" }, h("b", {}, "Drop recordings here"),
     " (CSV, MAT, TwinCAT, ROS 2, MCAP, Parquet, HDF5, TDMS), or a mechanism (MJCF, URDF). Three of different motions are best. "), input);
+  return droppable(zone, data => take([...data.files]));
+}
+
+/** An element on which something is dropped; given: does something with it. */
+function droppable(zone, given) {
   zone.ondragover = event => { event.preventDefault(); zone.classList.add("over"); };
   zone.ondragleave = () => zone.classList.remove("over");
-  zone.ondrop = event => { event.preventDefault(); zone.classList.remove("over"); take([...event.dataTransfer.files]); };
+  zone.ondrop = event => { event.preventDefault(); zone.classList.remove("over"); given(event.dataTransfer); };
   return zone;
 }
 
@@ -185,15 +190,10 @@ function rolesOf(state) {
     const own = state.recordings.filter(r => r.role === role);
     const zone = h("div", { id: `drop-${role}`, class: "role" }, h("b", {}, role),
       ...own.map(r => h("span", { class: "chip", draggable: "true", ondragstart: e => { e.dataTransfer.setData("text/plain", r.file); } }, r.sources[0] ?? r.file)));
-    zone.ondragover = event => { event.preventDefault(); zone.classList.add("over"); };
-    zone.ondragleave = () => zone.classList.remove("over");
-    zone.ondrop = event => {
-      event.preventDefault();
-      zone.classList.remove("over");
-      const file = event.dataTransfer.getData("text/plain");
+    return droppable(zone, data => {
+      const file = data.getData("text/plain");
       if (state.recordings.some(r => r.file === file && r.role !== role)) run("project", "role", file, "--to", role);
-    };
-    return zone;
+    });
   }));
 }
 
