@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
+from identify.dataset.odd_log import FEWEST
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.spectrum import Record, find_lines
 from identify.dataset.test_function import OVERLAP
@@ -40,6 +41,7 @@ HATS = 16  # knots of a curve over a coordinate; finer ones would learn the nois
 MOVED = ("velocity", "acceleration", "direction")
 CONTROLS = 40  # of which none may do as well: 1 noise in 41 is refused
 SHIFTS = (0.1, 0.9)  # of a log, by which its residual is shifted
+ALIKE = 1.5  # times the error of other logs that noise may have in one
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +165,25 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
     least = gaussian - SURE * np.sqrt(24.0 / effective_samples(rest.force))
-    if kurtosis < least or rest.is_predictable() or rest.has_line():
+    if kurtosis < least or rest.is_predictable() or rest.has_line() or _hidden(fit, logs):
         return False
     if fit.noise.follows_motion:
         return True
     if kurtosis > laplace:
         return False
-    alike = 1.5  # times the error of the training logs that noise may have on others
-    larger = dataset.selection and rms(error_on(fit.axis, dataset.selection)) > alike * fit.error
+    larger = dataset.selection and rms(error_on(fit.axis, dataset.selection)) > ALIKE * fit.error
     return not larger and not rest.size_is_predictable()
+
+
+def _hidden(fit: Fit, logs: Sequence[PreparedLog]) -> bool:
+    """Whether one log, louder than the others, hides what something measured predicts of them."""
+    left = [error_on(fit.axis, [log]) for log in logs]
+    loudest = max(range(len(logs)), key=lambda k: rms(left[k]) if left[k].size else 0.0)
+    others = [*logs[:loudest], *logs[loudest + 1 :]]
+    theirs = np.concatenate([*left[:loudest], *left[loudest + 1 :]])
+    if len(others) + 1 < FEWEST or rms(left[loudest]) < ALIKE * rms(theirs):
+        return False
+    return Remainder.of(fit, others).is_predictable()
 
 
 def with_own_noise(fit: Fit, dataset: Dataset) -> tuple[Dataset, Fit]:

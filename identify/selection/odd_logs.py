@@ -60,10 +60,11 @@ def _without_suspect(
         return None
     ended = conclude(*_others(base, dataset, name))
     odd = _odd_beside(ended, dataset)
-    if not ended.findings or odd is None or odd.log != name or odd.otherwise is None:
+    if not ended.findings or odd is None or odd.log != name or not odd.is_sure:
         return None
-    own = odd.otherwise.effect in {step.change.name for step in ended.found.steps}
-    return None if own or not odd.is_sure else (ended, odd)
+    laws = {step.change.name for step in ended.found.steps}
+    own = odd.otherwise is not None and odd.otherwise.effect in laws
+    return None if own else (ended, odd)
 
 
 def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]:

@@ -219,6 +219,15 @@ def test_only_what_nothing_foretells_is_noise(force, is_noise, held):
     assert again.at_floor is is_noise
 
 
+@pytest.mark.parametrize(("force", "is_noise"), [(noise, True), (of_place, False)])
+def test_what_one_log_is_louder_by_makes_no_noise_of_the_others(force, is_noise):
+    def touched(log, rng):
+        return force(log, rng) + 3.0 * noise(log, rng) * (log.motion.name == "one")
+
+    data = left(touched)
+    assert noise_is_left(fit_to(data), data) is is_noise
+
+
 def test_noise_is_part_of_the_floor_and_said():
     data = left(noise)
     fit = fit_to(data)
