@@ -53,7 +53,7 @@ PLAIN = axis_of()
 
 def known_floor(value: float) -> NoiseFloor:
     """A noise floor (N RMS) without uncertainty."""
-    return NoiseFloor(value, value, value, {"rounding": 0.0, "aliasing": 0.0})
+    return NoiseFloor(value, value, value, value, {"rounding": 0.0, "aliasing": 0.0})
 
 
 def built_fit(

@@ -36,7 +36,6 @@ from identify.dataset.prepared_log import (
 )
 from identify.dataset.readings import rate_gain, white_rounding
 from identify.dataset.spectrum import median_spectrum
-from identify.dataset.test_function import TestFunction
 from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array, between, local_parabola
@@ -49,15 +48,17 @@ _PARTS = WeakKeyDictionary()
 class NoiseFloor:
     """What noise alone leaves in a force residual, N RMS by test functions.
 
-    low, high: between which it is, with a probability of 95 %. parts: N RMS of each, whose squares
-    make up that of value: "sensors", white; "rounding" of the readings, where the axis has an
-    encoder with steps; "aliasing" of the command by a thinned log; "path", what laws with memory
-    make of what the readings do not tell of it; "force", that no sensor makes.
+    low, high: between which it is, with a probability of 95 %. most: the upper end without what
+    rounding may add that the axis does not know, which is what a model lacks. parts: N RMS of each,
+    whose squares make up that of value: "sensors", white; "rounding" of the readings, where the
+    axis has an encoder with steps; "aliasing" of the command by a thinned log; "path", what laws
+    with memory make of what the readings do not tell of it; "force", that no sensor makes.
     """
 
     value: float
     low: float
     high: float
+    most: float
     parts: Mapping[str, float]
 
     @property
@@ -125,11 +126,18 @@ def floor_of(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
     return noise_beside(axis, logs).value
 
 
-def white_noise_floor(axis: AxisModel, logs: Sequence[tuple[Motion, TestFunction]]) -> float:
-    """RMS in N of what white noise leaves in the force residual, that of rounding at speed too."""
-    motions = [motion for motion, _ in logs]
+def quiet_floor(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
+    """RMS in N of what white noise and the rounding of readings leave in the force residual.
+
+    Whatever of it the axis knows: test functions are to be as long as it asks for.
+    """
+    motions = [log.motion for log in logs]
     noises = noises_of(axis, motions)
-    return _together([n.passed(*log) for n, log in zip(noises, logs, strict=True)], motions)
+    pairs = zip(noises, motions, logs, strict=True)
+    white = _together(
+        [_unrounded(n, m).passed(m, log.test_function) for n, m, log in pairs], motions
+    )
+    return float(np.hypot(white, rounding_in(axis, logs)))
 
 
 def rounding_in(axis: AxisModel, logs: Sequence[PreparedLog]) -> float:
@@ -169,8 +177,9 @@ def _of_parts(
     sure = NormalDist().inv_cdf(1.0 - 0.5 * RULE.chance)
     scatter = sure * np.sqrt(sum((2.0 * errors[k] * v**2) ** 2 for k, v in parts.items()))
     low = np.sqrt(max(power - scatter, 0.0))
-    high = np.sqrt(power + scatter + (0.0 if told else rounds**2))
-    return NoiseFloor(float(np.sqrt(power)), float(low), float(high), parts)
+    most = float(np.sqrt(power + scatter))
+    high = most if told else float(np.hypot(most, rounds))
+    return NoiseFloor(float(np.sqrt(power)), float(low), high, most, parts)
 
 
 THROUGHOUT = 0.99  # of the weight of a test function: all of it but for rounding

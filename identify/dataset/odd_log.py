@@ -39,7 +39,8 @@ class Disagreement:
 
     error, others: N RMS that a fit of the others leaves in it, and at most in any of them; of a
     moment its peaks. span: s, from when to when most of its error is; None where throughout.
-    otherwise: None where no single value explains it.
+    otherwise: None where no single value explains it. at_rest: whether it is at rest then, which
+    says nothing of the model: the log serves it as it is.
     """
 
     log: str
@@ -47,6 +48,7 @@ class Disagreement:
     others: float
     span: tuple[float, float] | None = None
     otherwise: Otherwise | None = None
+    at_rest: bool = False
 
     @property
     def times(self) -> float:

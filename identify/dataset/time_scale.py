@@ -14,7 +14,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.dataset.motion import Motion
-from identify.dataset.noise_floor import white_noise_floor
+from identify.dataset.noise_floor import quiet_floor
+from identify.dataset.prepared_log import PreparedLog, moving
 from identify.dataset.test_function import LEAST_BLOCKS, LOOK, SHORTEST, TestFunction
 from twin.model.machine import INERTIA, MASS, AxisModel
 from twin.signals import Array
@@ -43,6 +44,15 @@ class AtLength:
         """N RMS of what is left beyond noise."""
         return float(np.sqrt(max(self.left**2 - self.floor**2, 0.0)))
 
+    @property
+    def told(self) -> float:
+        """What it tells beside noise, in nats per second of the logs.
+
+        As a channel: as often as test functions are new, the logarithm of signal to noise (C. E.
+        Shannon, Communication in the Presence of Noise, 1949).
+        """
+        return float(np.log(max(self.left / self.floor, 1.0))) / self.length
+
     def shows_more_than(self, quiet: AtLength) -> bool:
         """Whether it holds a force, sure beside its noise, that a quieter scale hides."""
         # times the noise floor, and the power at a quiet length, from which a force shows
@@ -52,11 +62,15 @@ class AtLength:
     @classmethod
     def of(cls, length: float, motions: Motions) -> AtLength:
         columns, forces, test_functions = regressors(motions, length)
+        each = zip(motions, test_functions, strict=True)
+        logs = [PreparedLog.of(m, w.length) for m, w in each]
+        moved = moving(logs, sticks=True)  # at rest friction balances what it is given
+        if moved.sum() > len(columns):
+            columns, forces = columns[:, moved], forces[moved]
         gains = np.linalg.lstsq(columns.T, forces, rcond=None)[0]
         left = forces - columns.T @ gains
         mass = max(float(gains[0]), _least_mass(motions))
-        floor = white_noise_floor(AxisModel(mass), list(zip(motions, test_functions, strict=True)))
-        return cls(length, float(np.sqrt(np.mean(left**2))), floor)
+        return cls(length, float(np.sqrt(np.mean(left**2))), quiet_floor(AxisModel(mass), logs))
 
 
 def choose_length(
@@ -92,10 +106,12 @@ def choose_test_function(motions: Motions, others: Motions = (), *, imposed: boo
     for length in TEST_FUNCTIONS:
         if length < LEAST_BLOCKS * longest_block:
             continue
-        test_functions = [TestFunction.of_length(length, m.period) for m in motions]
-        pairs = list(zip(motions, test_functions, strict=True))
-        rest = np.concatenate([w.mean(m.net) - mass * w.acceleration(m.velocity) for m, w in pairs])
-        if white_noise_floor(AxisModel(mass), pairs) < QUIET * np.sqrt(np.mean(rest**2)):
+        logs = [PreparedLog.of(motion, length) for motion in motions]
+        rest = np.concatenate([
+            log.test_function.mean(m.net) - mass * log.test_function.acceleration(m.velocity)
+            for log, m in zip(logs, motions, strict=True)
+        ])  # fmt: skip
+        if quiet_floor(AxisModel(mass), logs) < QUIET * np.sqrt(np.mean(rest**2)):
             return length
     return max(TEST_FUNCTIONS[-1], LEAST_BLOCKS * longest_block)
 

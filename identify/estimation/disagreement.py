@@ -11,7 +11,7 @@ so against all moments of all logs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,13 +64,15 @@ def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | 
     """The log that disagrees with the others, by a model with its values; None where none does.
 
     It is looked for with test functions of their length and with longer ones, which are quiet.
-    Where the others do not agree without it, the model is what is wrong, and no log. Of a
-    mechanism, whose joints share their logs, none is told.
+    Where the two tell two logs, the one that is sure counts. Where the others do not agree without
+    it, the model is what is wrong, and no log. Of a mechanism, whose joints share their logs, none
+    is told.
     """
     if any(log.motion.bodies is not None for log in logs):
         return None
     each = [_at_one_length(axis, some) for some in (logs, _longer(logs)) if some]
     found = [d for d in each if d is not None]
+    found = [d for d in found if d.is_sure] or found
     same = len({d.log for d in found}) == 1
     return max(found, key=lambda d: d.times) if same else None
 
@@ -82,10 +84,32 @@ def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
     does only where none of the others does.
     """
     deciding = (*dataset.training, *dataset.selection)
-    if (odd := disagreeing(axis, deciding)) is not None or not dataset.test:
+    if (odd := disagreeing(axis, deciding)) is not None:
         return odd
-    odd = disagreeing(axis, dataset.logs)
-    return odd if odd and odd.log in {log.motion.name for log in dataset.test} else None
+    odd = disagreeing(axis, dataset.logs) if dataset.test else None
+    if odd and odd.log in {log.motion.name for log in dataset.test}:
+        return odd
+    return _at_rest(axis, deciding)
+
+
+def _at_rest(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
+    """The log with one moment of its rests that stands out against all of all logs, if any.
+
+    A force that no motion follows, beyond what friction holds anywhere: a glitch of the recording,
+    a stop, a hand. No fit of an axis that sticks sees it.
+    """
+    if len(logs) < FEWEST or not sticks(axis) or any(log.motion.bodies is not None for log in logs):
+        return None
+    left = [residual(axis, [log]) for log in logs]
+    times = [log.time[: len(own)] for log, own in zip(logs, left, strict=True)]
+    told = [moving([log], sticks(axis)) for log in logs]
+    for k, (log, own) in enumerate(zip(logs, left, strict=True)):
+        if told[k][int(np.argmax(np.abs(own)))]:
+            continue
+        others = [*left[:k], *left[k + 1 :]]
+        if (moment := _moment(log, times[k], own, others, 1.0)) is not None:
+            return replace(moment, at_rest=True)
+    return None
 
 
 def suspect(axis: AxisModel, dataset: Dataset) -> str | None:
@@ -175,7 +199,7 @@ def _against(
     more = FEW if len(rows) == FEWEST else 1.0
     left, theirs = _predicted(own, others)
     most = max(map(rms, theirs))
-    if (moment := _moment(own, left, theirs, more)) is not None:
+    if (moment := _moment(own.log, own.time, left, theirs, more)) is not None:
         return moment
     near, name = _near(own, others), own.log.motion.name
     best, gain = _best(own, left)
@@ -270,28 +294,33 @@ def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
 
-def _moment(own: _Rows, left: Array, theirs: Sequence[Array], more: float) -> Disagreement | None:
-    """One moment that stands out against all others of all logs; None where there is none."""
+def _moment(
+    log: PreparedLog, time: Array, left: Array, theirs: Sequence[Array], more: float
+) -> Disagreement | None:
+    """One moment that stands out against all others of all logs; None where there is none.
+
+    left (n,): N, of the log at these times (n,) s. theirs: N, of the others.
+    """
     size = np.abs(left)
     peak = int(np.argmax(size))
     large = np.flatnonzero(size > size[peak] / PEAK)
-    length = own.log.test_function.length
+    length = log.test_function.length
     first = last = peak
     for at in large[large > peak]:
-        if own.time[at] - own.time[last] > 2.0 * length:
+        if time[at] - time[last] > 2.0 * length:
             break
         last = int(at)
     for at in large[large < peak][::-1]:
-        if own.time[first] - own.time[at] > 2.0 * length:
+        if time[first] - time[at] > 2.0 * length:
             break
         first = int(at)
-    span = float(own.time[first]), float(own.time[last])
-    beside = (own.time < span[0] - length) | (own.time > span[1] + length)
+    span = float(time[first]), float(time[last])
+    beside = (time < span[0] - length) | (time > span[1] + length)
     rest = max(np.abs(r).max(initial=0.0) for r in (*theirs, size[beside]))
-    lasts = span[1] - span[0] > MOMENT * (own.time[-1] - own.time[0])
+    lasts = span[1] - span[0] > MOMENT * (time[-1] - time[0])
     if lasts or size[peak] < more * PEAK * rest:
         return None
-    return Disagreement(own.log.motion.name, float(size[peak]), float(rest), span)
+    return Disagreement(log.motion.name, float(size[peak]), float(rest), span)
 
 
 def _span(time: Array, left: Array) -> tuple[float, float] | None:

@@ -172,8 +172,8 @@ class Fit:
 
     @property
     def at_floor(self) -> bool:
-        """Whether the error is at the noise floor."""
-        return self.ratio < RULE.at_floor
+        """Whether the error is at the noise floor, or within what is sure of it."""
+        return self.error < max(RULE.at_floor * self.floor, self.noise.most)
 
     @property
     def ratio(self) -> float:

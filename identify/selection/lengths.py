@@ -36,7 +36,7 @@ def at_another_length(
     showing = [*_showing(ended.found, lengths, catalogue)]
     if not showing:
         return ended
-    length = max(showing, key=lambda judged: judged.fit.ratio).dataset.length
+    length = max(showing, key=lambda judged: _shown(judged).told).dataset.length
     asked = within(progress, f"at {1e3 * length:.3g} ms")
     rival = _asked(length, ended.found.base, catalogue, asked)
     return rival if _stands(rival, ended) else ended
@@ -45,13 +45,16 @@ def at_another_length(
 def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> Iterator[Judged]:
     """What was found at each length (s) at which it leaves a force that its own length hides."""
     own = _shown(found.final)
+    # What is left here and is not explained may be so for the noise that a longer one averages out.
+    hidden = found.final.at_floor or not found.steps
     for length in lengths:
         if (dataset := _telling(length, found, catalogue)) is None:
             continue
         there = Judged(fit_axis(found.final.fit.axis, dataset.training), dataset)
         if there.at_floor:
             continue
-        shows = found.final.at_floor if length > own.length else _shown(there).shows_more_than(own)
+        longer = length > own.length
+        shows = hidden if longer else _shown(there).shows_more_than(own)
         if shows:
             yield there
 

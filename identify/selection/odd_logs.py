@@ -30,15 +30,21 @@ def without_odd_log(
     """
     odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
-        ended = conclude(*_others(base, dataset, odd.log if odd else None))
-        first, odd = odd, _odd_beside(ended, dataset)
-        if (first and first.log) == (odd and odd.log):
+        left_out = _spoiling(odd)
+        ended = conclude(*_others(base, dataset, left_out))
+        odd = _odd_beside(ended, dataset)
+        if left_out == _spoiling(odd):
             break
     else:
         ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
-    if odd is None and _is_unexplained(ended):
-        return _without_suspect(base, dataset, conclude) or (ended, None)
+    if _spoiling(odd) is None and _is_unexplained(ended):
+        return _without_suspect(base, dataset, conclude) or (ended, odd)
     return ended, odd
+
+
+def _spoiling(odd: Disagreement | None) -> str | None:
+    """The log that is left out for how it disagrees; what happens at rest spoils nothing."""
+    return odd.log if odd and not odd.at_rest else None
 
 
 def _is_unexplained(ended: Conclusion) -> bool:
@@ -54,7 +60,8 @@ def _without_suspect(
 
     Where all that is left is of one log, nothing is proved with it, and beside so much it does not
     stand out: both are seen only at once. But the log that refutes a wrong law is left out as well
-    by this. So it must be otherwise in one value that is no matter of what was found without it.
+    by this. So it must be otherwise in a part of its time, or in one value that is no matter of
+    what was found without it.
     """
     if (name := suspect(base.axis, dataset)) is None:
         return None

@@ -10,12 +10,16 @@ from identify.output.numbers import number, quantity
 from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
 from twin.model.units import AxisUnits
 
+_TO_DO = "leave it out, or find what was otherwise"
+
 
 def odd_in_words(dataset: Dataset) -> str:
     """Of a dataset with an odd log: which it is, how it disagrees, what was done or is to do."""
     assert dataset.odd is not None
     kept = any(log.motion.name == dataset.odd.log for log in dataset.logs)
-    what = "leave it out, or find what was otherwise" if kept else "all else is told without it"
+    what = _TO_DO if kept else "all else is told without it"
+    if dataset.odd.at_rest:
+        what = "the axis is at rest there, so that no fit uses it: see what happened"
     return f"{dataset.odd.log} {_disagrees(dataset.odd, dataset.units)}; {what}"
 
 
@@ -29,7 +33,7 @@ def with_odd(
             continue
         own = LogFinding(
             Severity.WARNING, Fault.ODD, axis, f"it {_disagrees(dataset.odd, dataset.units)}",
-            WHOLE, "leave it out, or find what was otherwise",
+            WHOLE, _TO_DO,
         )  # fmt: skip
         report = out[dataset.odd.log]
         out[dataset.odd.log] = CheckReport((*report.findings, own))

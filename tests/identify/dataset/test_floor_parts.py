@@ -6,7 +6,7 @@ from identify.dataset.noise_floor import NoiseFloor
 
 
 def floor(**parts: float) -> NoiseFloor:
-    return NoiseFloor(1.0, 0.8, 1.2, {"rounding": 0.6, "aliasing": 0.3, "path": 0.2, **parts})
+    return NoiseFloor(1.0, 0.8, 1.2, 1.2, {"rounding": 0.6, "aliasing": 0.3, "path": 0.2, **parts})
 
 
 def test_a_floor_follows_the_motion_where_most_of_its_square_does():

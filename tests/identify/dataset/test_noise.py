@@ -18,12 +18,18 @@ from identify.dataset.blocks import Blocks
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
 from identify.dataset.noise import noise_of, noises_of
-from identify.dataset.noise_floor import floor_of, noise_beside, rounding_in, white_noise_floor
+from identify.dataset.noise_floor import floor_of, noise_beside, rounding_in
 from identify.dataset.prepared_log import PreparedLog, moving, on_blocks, sticks, total_force
 from identify.dataset.readings import white_rounding
 from identify.dataset.spectrum import fitted_levels, median_spectrum
 from identify.dataset.test_function import TestFunction
-from identify.dataset.time_scale import QUIET, TEST_FUNCTIONS, choose_test_function, inertia
+from identify.dataset.time_scale import (
+    QUIET,
+    TEST_FUNCTIONS,
+    choose_length,
+    choose_test_function,
+    inertia,
+)
 from identify.estimation.force_balance import residual
 from twin.checks import moves
 from twin.effect import LEAST
@@ -165,6 +171,21 @@ def test_moves_of_even_speed_have_rounding_where_their_speed_puts_it():
         true = SLIDE.mass * rms(one.fine.acceleration(rate)[moving([one], sticks(SLIDE))])
         ratios.append(rounding_in(SLIDE, [one]) / true)
     assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_length_is_chosen_at_which_the_steps_of_the_readings_are_quiet():
+    def chosen(step: float) -> float:
+        logs = [logged(SLIDE, Ride(seed, fast=0.05), noise=0.0).axes["x"] for seed in (100, 101)]
+        motions = tuple(
+            motion_of(
+                log_of(RATE, step * np.rint(g.position / step), g.force), "x", "r", ripples=()
+            )
+            for g in logs
+        )
+        return choose_length(lambda length: (motions, ()))
+
+    assert chosen(1e-8) == TEST_FUNCTIONS[0]
+    assert chosen(3e-6) > TEST_FUNCTIONS[0]
 
 
 def test_rounding_is_not_taken_for_noise_of_the_force():
@@ -315,8 +336,6 @@ def test_the_square_of_a_floor_of_logs_is_the_mean_of_theirs_weighed_by_their_le
     assert parts[1] > 2.5 * parts[0]
     wanted = (own[0] * parts[0] + own[1] * parts[1]) / sum(parts)
     assert floor_of(axis, logs) ** 2 == pytest.approx(wanted, rel=1e-9)
-    pairs = [(log.motion, log.test_function) for log in logs]
-    assert white_noise_floor(axis, pairs[::-1]) == pytest.approx(floor_of(axis, logs))
 
 
 def test_the_shortest_window_that_is_quiet_is_chosen():

@@ -127,9 +127,11 @@ def test_a_fit_is_at_its_floor_below_a_ratio():
     np.testing.assert_allclose(fit.jacobian, jacobian(fit.axis, LOGS, fit.scaling.where)[fit.kept])
     assert fit.error == pytest.approx(np.sqrt(np.mean(fit.residual**2)))
     for ratio, wanted in ((0.999, True), (1.001, False)):
-        scaled = replace(fit, residual=fit.residual * ratio * RULE.at_floor * fit.floor / fit.error)
-        assert scaled.ratio == pytest.approx(ratio * RULE.at_floor)
-        assert scaled.at_floor is wanted
+        for sure in (1.0, 1.2):  # times that ratio, up to which this noise may reach
+            most = RULE.at_floor * fit.floor * sure
+            scaled = replace(fit, residual=fit.residual * ratio * most / fit.error)
+            scaled.__dict__["noise"] = replace(fit.noise, most=most if sure > 1.0 else 0.0)
+            assert scaled.at_floor is wanted
     assert np.isnan(rms(np.zeros(0)))
     assert fit.gain == 1.0
     assert finished(fit.axis, fit.axis, LOGS, Outcome.AT_BOUND).outcome is Outcome.AT_BOUND

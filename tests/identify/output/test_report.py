@@ -467,7 +467,7 @@ def test_a_gap_is_missing_where_few_of_the_data_are(share, said) -> None:
 def test_noise_that_logging_makes_is_told_with_what_to_log_instead(
     part: str, advice: str, size: float, told: bool
 ) -> None:
-    noise = NoiseFloor(0.04, 0.03, 0.05, {"sensors": 0.01, part: size})
+    noise = NoiseFloor(0.04, 0.03, 0.05, 0.05, {"sensors": 0.01, part: size})
     said = noise_in_words(noise, LINEAR) or ""
     assert bool(said) is told
     assert ("38.0 mN of the noise floor of 40.0 mN" in said) is told

@@ -89,6 +89,27 @@ def test_a_push_is_told_with_its_time() -> None:
     assert 1.9 < odd.span[0] <= odd.span[1] < 2.3
 
 
+def test_a_glitch_at_rest_is_told_and_costs_no_log() -> None:
+    logs = runs()
+    speed = RIDES["run1"].speed()
+    at = 2000 + int(np.argmax(np.convolve(speed[2000:] == 0.0, np.ones(100), "valid")))
+
+    def glitch(force: np.ndarray) -> np.ndarray:
+        force[at + 40 : at + 60] += 40.0
+        return force
+
+    training = {**logs, "run1": with_force(logs["run1"], glitch)}
+    held = {"run3": training.pop("run3")}
+    found = identify.diagnose(MODEL, training, held, catalogue=few("spring"))
+    odd = found.axes["x"].dataset.odd
+    assert odd is not None
+    assert odd.log == "run1"
+    assert odd.span is not None
+    assert odd.span == pytest.approx(((at + 40) / RATE, (at + 60) / RATE), abs=0.02)
+    assert len(found.axes["x"].dataset.training) == 3
+    assert "at rest there, so that no fit uses it" in str(found)
+
+
 def test_of_two_logs_none_is_told() -> None:
     heavy = replace(SLIDE, mass=1.5 * SLIDE.mass)
     logs = {name: log for name, log in runs(run1=heavy).items() if name in ("run0", "run1")}
