@@ -45,17 +45,17 @@ def at_another_length(
 def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> Iterator[Judged]:
     """What was found at each length (s) at which it leaves a force that its own length hides."""
     own = _shown(found.final)
-    # What is left here and is not explained may be so for the noise that a longer one averages out.
-    hidden = found.final.at_floor or not found.steps
+    explained = bool(found.steps)
     for length in lengths:
         if (dataset := _telling(length, found, catalogue)) is None:
             continue
         there = Judged(fit_axis(found.final.fit.axis, dataset.training), dataset)
         if there.at_floor:
             continue
-        longer = length > own.length
-        shows = hidden if longer else _shown(there).shows_more_than(own)
-        if shows:
+        # A longer one averages out what hides a force here; a shorter one shows what is fast.
+        longer, shown = length > own.length, _shown(there)
+        shows = found.final.at_floor if longer else shown.shows_more_than(own)
+        if shows or not explained:
             yield there
 
 
