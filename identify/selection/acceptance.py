@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.noise_floor import floor_of
+from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
 from identify.estimation.fit import Fit, has_nonparametric, smoothing
@@ -161,7 +161,11 @@ class Judged:
         if not holdout:
             return self.fit.floor
         logged = rms(np.concatenate([log.command for log in holdout])[np.isfinite(self.other)])
-        return min(floor_of(self.fit.axis, holdout), logged or np.inf)
+        return min(self._other_noise.value, logged or np.inf)
+
+    @cached_property
+    def _other_noise(self) -> NoiseFloor:
+        return noise_beside(self.fit.axis, self.dataset.selection)
 
     @cached_property
     def parameters(self) -> float:
@@ -175,8 +179,10 @@ class Judged:
     @property
     def other_at_floor(self) -> bool:
         """Whether noise is all that is left on logs that were not fitted; not of none."""
-        error, held = self.other_error, bool(self.dataset.selection)
-        return held and error < RULE.at_floor * self.other_floor
+        if not self.dataset.selection:
+            return False
+        sure = max(RULE.at_floor * self.other_floor, self._other_noise.most)
+        return self.other_error < sure
 
     @property
     def at_floor(self) -> bool:
