@@ -284,6 +284,7 @@ def diagnose(
         of_axis = within(progress, f"diagnosis of {axis}")
         told = diagnose_axis(fitted, away.datasets[axis], every, of_axis, lengths)
         axes[axis] = away.with_ties(told)
+    bodies = away.bodies_beside(axes)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():
@@ -302,7 +303,7 @@ def diagnose(
         not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
-        bodies=away.bodies,
+        bodies=bodies,
         recording=given.recording,
     )
     _ = found.model  # it is complete: to tell it computes nothing

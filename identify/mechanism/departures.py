@@ -36,7 +36,7 @@ class Departures:
     """What must move, and the joints beside the bodies as they were found.
 
     asked: whether the joints are those of a mechanism, and more than noise is left of them. names:
-    of the laws by which groups are told.
+    of the laws by which groups are told. groups: all that were asked.
     """
 
     datasets: Mapping[str, Dataset]
@@ -45,6 +45,7 @@ class Departures:
     bodies: tuple[WrongBody, ...] = ()
     asked: bool = False
     names: Mapping[What, str] = field(default_factory=dict)
+    groups: Sequence[Group] = ()
 
     def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
         """The effects that a diagnosis of that axis may name.
@@ -73,6 +74,33 @@ class Departures:
             for f in found.findings
         )
         return replace(found, findings=findings)
+
+    def bodies_beside(self, axes: Mapping[str, AxisDiagnosis]) -> tuple[WrongBody, ...]:
+        """The bodies once more, beside all that was found of the joints since.
+
+        What a joint lacked had been a part of their values, and too small a part of their bands.
+        """
+        if not self.bodies:
+            return ()
+        before = {axis: _on_beginnings(d.final, d.dataset) for axis, d in axes.items()}
+        first = {body.body: body for body in self.bodies}
+        moved = [
+            replace(g, corrected=first[g.place].change)
+            for g in self.groups
+            if g.what is What.BODY and g.place in first
+        ]
+        gains = [g for g in self.groups if g.what is What.GAIN]
+        told = _Told.of(regression_of(before, [*moved, *gains]), moved)
+        for group in moved:
+            assert group.body is not None
+            group.body.forget()
+        return tuple(
+            replace(
+                body, change=body.change + told.changes[name], band=told.bands[name],
+                disagreeing=told.disagreeing[name],
+            )
+            for name, body in first.items()
+        )  # fmt: skip
 
     def told(self, group: Group) -> str:
         """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
@@ -109,7 +137,8 @@ def departures_of(
         body.forget()
     moved = Choice(regression).moved()
     names = {what: what.named(catalogue) for what in What}
-    return _with_bodies(replace(nothing, moved=moved, asked=True, names=names), regression)
+    found = replace(nothing, moved=moved, asked=True, names=names, groups=regression.groups)
+    return _with_bodies(found, regression)
 
 
 def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:

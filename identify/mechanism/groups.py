@@ -32,7 +32,8 @@ class Group:
     axis: of the joint. body: where it is one. scale (k,): how far each may be off by itself, in its
     own unit; infinite where nothing is known of that. least (k,): the least change of each that is
     possible. unstated: whether the file says nothing of what is there for sure, as of a motor's
-    rotor. reach: positions (rad or m) of the joint on the training logs.
+    rotor. reach: positions (rad or m) of the joint on the training logs. corrected (k,): by which a
+    body was changed already.
     """
 
     what: What
@@ -42,6 +43,7 @@ class Group:
     body: Body | None = None
     reach: Reach = (-1.0, 1.0)
     unstated: bool = False
+    corrected: Array | float = 0.0
 
     @property
     def place(self) -> str:

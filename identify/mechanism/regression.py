@@ -359,4 +359,4 @@ def _range(span: slice) -> Array:
 
 def _inertial(group: Group) -> Array:
     assert group.body is not None
-    return group.body.inertial
+    return np.asarray(group.body.inertial + group.corrected)
