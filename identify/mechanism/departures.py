@@ -78,7 +78,8 @@ class Departures:
     def bodies_beside(self, axes: Mapping[str, AxisDiagnosis]) -> tuple[WrongBody, ...]:
         """The bodies once more, beside all that was found of the joints since.
 
-        What a joint lacked had been a part of their values, and too small a part of their bands.
+        What a joint lacked had been a part of their values, and no part of their bands. What it may
+        lack still is as likely to move them as far: so far they moved is within the bands.
         """
         if not self.bodies:
             return ()
@@ -96,8 +97,8 @@ class Departures:
             group.body.forget()
         return tuple(
             replace(
-                body, change=body.change + told.changes[name], band=told.bands[name],
-                disagreeing=told.disagreeing[name],
+                body, change=body.change + told.changes[name],
+                band=np.hypot(told.bands[name], told.changes[name]), disagreeing=told.disagreeing[name],
             )
             for name, body in first.items()
         )  # fmt: skip

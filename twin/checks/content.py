@@ -160,6 +160,35 @@ def check_excitation(axis: Axis) -> Iterator[LogFinding]:
             f"{noise:.2g} of the {rms:.2g} {axis.log.kind.acceleration} seen",
             "use a finer encoder or a livelier motion",
         )
+    yield from _aliased(axis, rounded)
+
+
+def _aliased(axis: Axis, rounded: bool) -> Iterator[LogFinding]:
+    """A motion at speeds of a whole number of encoder steps a sample.
+
+    Rounding is a tone of speed over step, Hz, folded at the sample rate: there it is as slow as the
+    motion, in the reading and in what a controller makes of it. rounded: whether the steps show.
+    """
+    slow, most = 10.0, 0.5  # Hz, what test functions pass; of the motion, to be worth a word
+    few = 20.0  # steps a sample; of more, rounding is a small part of what a sample moves
+    if not rounded:
+        return
+    speed = np.abs(axis.velocity)
+    tone = speed[speed > axis.still] / axis.position_step
+    steps = np.rint(tone / axis.sample_rate)
+    beside = (steps > 0.0) & (steps <= few) & (np.abs(tone - steps * axis.sample_rate) < slow)
+    if not np.mean(beside) > most:
+        return
+    often = float(np.median(steps[beside]))
+    each, kind = axis.position_step * axis.sample_rate, axis.log.kind
+    yield axis.warning(
+        Fault.ALIASED,
+        f"in {100.0 * np.mean(beside):.0f} % of the motion the reading moves by whole steps of "
+        f"{axis.position_step:.3g} {kind.position} a sample (speeds that are multiples of "
+        f"{each:.3g} {kind.velocity}): what rounding makes is slow there, and looks like a force",
+        f"move at other speeds, such as {(often + 0.4) * each:.3g} {kind.velocity}, or log at "
+        "another rate",
+    )
 
 
 def _constant(axis: Axis) -> Iterator[LogFinding]:

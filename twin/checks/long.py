@@ -17,7 +17,12 @@ from twin.logs.decode import read_parts, require_intact, samples_by_axis
 from twin.logs.log import Log, in_multiples, joined, thinned
 from twin.signals import Array
 
-OF_THE_WHOLE = (Fault.FLAT, Fault.WEAK_EXCITATION, Fault.COARSE_POSITION)  # not of each part
+OF_THE_WHOLE = (
+    Fault.FLAT,
+    Fault.WEAK_EXCITATION,
+    Fault.COARSE_POSITION,
+    Fault.ALIASED,
+)  # not of each part
 # Samples, all axes together. A check takes 130 bytes a sample beside 0.1 GB for the program.
 LARGEST_PART = 2_500_000
 # A fit takes some 75 bytes a sample and more for each millisecond of motion, which no rate changes.

@@ -39,6 +39,7 @@ class Fault(Enum):
     OUTLIERS = "samples that cannot be"
     SATURATION = "the command is limited"
     COARSE_POSITION = "the position is too coarse"
+    ALIASED = "the steps of the reading come as often as the samples"
     WEAK_EXCITATION = "the motion excites too little"
     COPY = "the log is a copy of another"
     ODD = "the log disagrees with the others"
