@@ -98,7 +98,8 @@ class Departures:
         return tuple(
             replace(
                 body, change=body.change + told.changes[name],
-                band=np.hypot(told.bands[name], told.changes[name]), disagreeing=told.disagreeing[name],
+                band=np.hypot(told.bands[name], told.changes[name]),
+                disagreeing=told.disagreeing[name],
             )
             for name, body in first.items()
         )  # fmt: skip
