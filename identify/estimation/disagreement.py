@@ -203,11 +203,12 @@ def _against(
         return moment
     near, name = _near(own, others), own.log.motion.name
     best, gain = _best(own, left)
-    own_value = None if gain is None else _otherwise(best, gain, own, axis, where)
+    usual, scatter = _among(best, others, theirs)
+    own_value = None if gain is None else _otherwise(best, gain - usual, own, axis, where)
     if own_value is not None and near.any():
-        change = abs(_gains(own, left, near)[0][best])
-        far = change > more * CLEAR * _scatter(best, others, theirs)
-        if far and change > CHANGED * _usual(best, own, own_value.elsewhere, where):
+        change = abs(_gains(own, left, near)[0][best] - usual)
+        far = change > more * CLEAR * scatter
+        if far and change > _least_change(best, own, own_value, where):
             return Disagreement(name, rms(left), most, None, own_value)
     seen = min(rms(left), rms(left[near])) if near.any() else 0.0
     if seen > more * OUT * most:
@@ -235,22 +236,35 @@ def _gains(
     return columns.T @ left[among] / np.where(size > 0.0, size, np.inf), size
 
 
-def _usual(at: int, own: _Rows, value: float, where: Sequence[ParameterReference]) -> float:
-    """The gain of a column that its value is, or the command, where it may have either sign."""
+def _least_change(
+    at: int, own: _Rows, value: Otherwise, where: Sequence[ParameterReference]
+) -> float:
+    """By how much the gain of a column must change at least: of what is usual a part.
+
+    Usual is its value, or the command, where it may have either sign. A delay is told by a sample,
+    whatever time the command takes to change.
+    """
+    if value.what is Recorded.DELAY:
+        return own.log.motion.sample_period
     if at < len(where) and where[at].parameter.lower >= 0.0:
-        return abs(value) * float(own.size[at])
+        return CHANGED * abs(value.elsewhere) * float(own.size[at])
     size = np.linalg.norm(own.every[:, at]) or np.inf
-    return float(np.linalg.norm(own.log.command[own.kept]) / size)
+    return CHANGED * float(np.linalg.norm(own.log.command[own.kept]) / size)
 
 
-def _scatter(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> float:
-    """The scatter of the gain of one column between logs, that which tell it most first."""
+def _among(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> tuple[float, float]:
+    """The mean gain of one column in other logs and its scatter, by how much each tells it.
+
+    The mean is not zero where it is of the recording, of which a fit has no column.
+    """
     gains, sizes = zip(
         *(_gains(r, left) for r, left in zip(others, theirs, strict=True)), strict=True
     )
     gain, size = np.stack(gains)[:, at], np.stack(sizes)[:, at]
+    whole = max(float(size.sum()), 1e-300)
+    mean = float(np.sum(size * gain)) / whole
     freedom = (len(others) - 1) / len(others)
-    return float(np.sqrt(np.sum(size * gain**2) / max(size.sum(), 1e-300) / freedom))
+    return mean, float(np.sqrt(np.sum(size * (gain - mean) ** 2) / whole / freedom))
 
 
 def _best(own: _Rows, left: Array) -> tuple[int, float | None]:

@@ -16,6 +16,7 @@ from benchmarks.silence import cases
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Recorded
+from identify.estimation.disagreement import odd_in
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -74,6 +75,20 @@ def test_what_is_otherwise_in_a_recording_is_told(change, what, size) -> None:
     assert odd.otherwise is not None
     assert odd.otherwise.what == what
     assert odd.otherwise.there == pytest.approx(size, rel=0.05)
+
+
+@pytest.mark.parametrize("late", [0, 3, 6])
+def test_a_delay_of_some_samples_is_told_beside_what_the_others_prove(late: int) -> None:
+    logs = runs()
+    spoiled = {**logs, "run1": with_force(logs["run1"], lambda force: np.roll(force, late))}
+    found = identify.fit(MODEL, spoiled)
+    odd = odd_in(found.fits["x"].axis, found.datasets["x"])
+    assert (odd is not None) == bool(late)
+    if odd is not None:
+        assert odd.log == "run1"
+        assert odd.otherwise is not None
+        assert odd.otherwise.what == Recorded.DELAY
+        assert odd.otherwise.there == pytest.approx(late / RATE, rel=0.2)
 
 
 def test_a_push_is_told_with_its_time() -> None:
