@@ -26,6 +26,7 @@ from benchmarks.second_simulator.recordings import AXIS, PATHS, SPOILED, recordi
 from identify.analysis.first_model import first_model
 from identify.workflow import diagnose
 from twin.checks import check_log
+from twin.checks.report import Fault
 
 TITLE = "What the logs prove, with one of five spoiled"
 SEED, MACHINES = 83, 60
@@ -111,9 +112,11 @@ def row(case: Case) -> Row:
     out = row_of(str(case), case.expected, found.axes[AXIS], spent)
     sound = [log for name, log in ordered if not (case.spoiled and name == case.which)]
     out["provable"] = is_provable(plant, plain, sound[:2], sound[2:])
-    refused = [name for name, log in ordered if not check_log(log).ok]
+    checked = {name: check_log(log) for name, log in ordered}
+    aliased = [n for n, c in checked.items() if any(f.fault is Fault.ALIASED for f in c.findings)]
+    refused = [name for name, report in checked.items() if not report.ok]
     odd = found.axes[AXIS].dataset.odd
-    told = [*refused, *([odd.log] if odd else [])]
+    told = [*refused, *aliased, *([odd.log] if odd else [])]
     out["accused"] = sorted(set(told))
     out["spoiled"] = case.which if case.spoiled else None
     print(f"|   provable {out['provable']}, accused {told} |", flush=True)
