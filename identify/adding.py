@@ -195,8 +195,9 @@ def correct_body(
             f"{model.mjcf_name}: the logs prove no body to correct it; `twin diagnose` says what "
             "they show"
         )
-    made = corrected(before.model, found.bodies, found.fits, file)
-    return CorrectedBody(made, before.model, found.bodies)
+    bodies = found.bodies_beside(found.fits, found.datasets)
+    made = corrected(before.model, bodies, found.fits, file)
+    return CorrectedBody(made, before.model, bodies)
 
 
 def _with_notes(made: Addition, *first: str | None) -> Addition:

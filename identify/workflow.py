@@ -284,7 +284,9 @@ def diagnose(
         of_axis = within(progress, f"diagnosis of {axis}")
         told = diagnose_axis(fitted, away.datasets[axis], every, of_axis, lengths)
         axes[axis] = away.with_ties(told)
-    bodies = away.bodies_beside(axes)
+    bodies = away.bodies_beside(
+        {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}
+    )
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     for d in axes.values():

@@ -75,15 +75,17 @@ class Departures:
         )
         return replace(found, findings=findings)
 
-    def bodies_beside(self, axes: Mapping[str, AxisDiagnosis]) -> tuple[WrongBody, ...]:
-        """The bodies once more, beside all that was found of the joints since.
+    def bodies_beside(
+        self, fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]
+    ) -> tuple[WrongBody, ...]:
+        """The bodies once more, beside all that was found of the joints since: their fits now.
 
         What a joint lacked had been a part of their values, and no part of their bands. What it may
         lack still is as likely to move them as far: so far they moved is within the bands.
         """
         if not self.bodies:
             return ()
-        before = {axis: _on_beginnings(d.final, d.dataset) for axis, d in axes.items()}
+        before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
         first = {body.body: body for body in self.bodies}
         moved = [
             replace(g, corrected=first[g.place].change)

@@ -287,7 +287,9 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
     file, said = result.fitted.mjcf_name, list[str]()
     for found in result.bodies:
         said += wrong_body_in_words(found, result.fitted)
-    command = f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
+    # Beside what joints lack a body is another than alone.
+    lacking = any(axis.findings for axis in result.axes.values())
+    command = WRITE if lacking else f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
     filled = source.filled(command, names_of(next(iter(result.axes.values())).dataset))
     elements = " and ".join(f"{b.written} into {_of(b, result.bodies)}" for b in result.bodies)
     return [*said, f"Next: {filled} writes {elements}, in a copy of {file}."]
