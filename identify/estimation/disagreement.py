@@ -101,13 +101,11 @@ def _at_rest(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | Non
     if len(logs) < FEWEST or not sticks(axis) or any(log.motion.bodies is not None for log in logs):
         return None
     left = [residual(axis, [log]) for log in logs]
-    times = [log.time[: len(own)] for log, own in zip(logs, left, strict=True)]
-    told = [moving([log], sticks(axis)) for log in logs]
     for k, (log, own) in enumerate(zip(logs, left, strict=True)):
-        if told[k][int(np.argmax(np.abs(own)))]:
+        if moving([log], sticks=True)[np.argmax(np.abs(own))]:
             continue
         others = [*left[:k], *left[k + 1 :]]
-        if (moment := _moment(log, times[k], own, others, 1.0)) is not None:
+        if (moment := _moment(log, log.time, own, others, 1.0)) is not None:
             return replace(moment, at_rest=True)
     return None
 
