@@ -45,7 +45,7 @@ class AtLength:
         return float(np.sqrt(max(self.left**2 - self.floor**2, 0.0)))
 
     @property
-    def told(self) -> float:
+    def information(self) -> float:
         """What it tells beside noise, in nats per second of the logs.
 
         As a channel: as often as test functions are new, the logarithm of signal to noise (C. E.

@@ -201,12 +201,13 @@ def _against(
         return moment
     near, name = _near(own, others), own.log.motion.name
     best, gain = _best(own, left)
-    usual, scatter = _among(best, others, theirs)
-    own_value = None if gain is None else _otherwise(best, gain - usual, own, axis, where)
-    if own_value is not None and near.any():
-        change = abs(_gains(own, left, near)[0][best] - usual)
+    own_value = None
+    if gain is not None:
+        usual, scatter = _among(best, others, theirs)
+        own_value = _otherwise(best, gain - usual, own, axis, where)
+        change = abs(_gains(own, left, near)[0][best] - usual) if near.any() else 0.0
         far = change > more * CLEAR * scatter
-        if far and change > _least_change(best, own, own_value, where):
+        if own_value and far and change > _least_change(best, own, own_value, where):
             return Disagreement(name, rms(left), most, None, own_value)
     seen = min(rms(left), rms(left[near])) if near.any() else 0.0
     if seen > more * OUT * most:

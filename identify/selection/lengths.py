@@ -36,7 +36,7 @@ def at_another_length(
     showing = [*_showing(ended.found, lengths, catalogue)]
     if not showing:
         return ended
-    length = max(showing, key=lambda judged: _shown(judged).told).dataset.length
+    length = max(showing, key=lambda judged: _shown(judged).information).dataset.length
     asked = within(progress, f"at {1e3 * length:.3g} ms")
     rival = _asked(length, ended.found.base, catalogue, asked)
     return rival if _stands(rival, ended) else ended
@@ -45,7 +45,6 @@ def at_another_length(
 def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> Iterator[Judged]:
     """What was found at each length (s) at which it leaves a force that its own length hides."""
     own = _shown(found.final)
-    explained = bool(found.steps)
     for length in lengths:
         if (dataset := _telling(length, found, catalogue)) is None:
             continue
@@ -53,9 +52,8 @@ def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> It
         if there.at_floor:
             continue
         # A longer one averages out what hides a force here; a shorter one shows what is fast.
-        longer, shown = length > own.length, _shown(there)
-        shows = found.final.at_floor if longer else shown.shows_more_than(own)
-        if shows or not explained:
+        shows = found.final.at_floor if length > own.length else _shown(there).shows_more_than(own)
+        if shows or not found.steps:
             yield there
 
 
