@@ -149,6 +149,22 @@ def moves(drive: Drive, rng: np.random.Generator) -> np.ndarray:
 
 
 @numba.njit
+def _friction(p, x, v, z, dt):  # pragma: no cover
+    """The friction (N) and the bristle's state after a step, exactly at its speed and strength.
+
+    By Euler steps the bristle swings where it relaxes within one, and its damping is a drag.
+    """
+    g = p.friction + (p.static - p.friction) * np.exp(-((v / p.slip) ** 2))
+    g *= 1.0 + p.modulation * np.sin(TURN * 0.37 * x / p.pitch)
+    if v < 0.0:
+        g *= 1.0 + p.asymmetry
+    end = np.sign(v) * g / p.stiffness
+    then = end + (z - end) * np.exp(-p.stiffness * abs(v) / g * dt)
+    damping = 2.0 * PRELOAD * np.sqrt(p.stiffness * p.mass)
+    return p.stiffness * then + damping * (then - z) / dt, then
+
+
+@numba.njit
 def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  # pragma: no cover
     """Readings and commands as logged, a sample each so many steps; semi-implicit Euler steps."""
     p, dt = plant, 1.0 / STEP
@@ -187,13 +203,7 @@ def simulate(plant, gains, path, speed, pushed, encoder, each, control, mean):  
             if mean:
                 command[i // each] = total / each
             total = 0.0
-        g = p.friction + (p.static - p.friction) * np.exp(-((v / p.slip) ** 2))
-        g *= 1.0 + p.modulation * np.sin(TURN * 0.37 * x / p.pitch)
-        if v < 0.0:
-            g *= 1.0 + p.asymmetry
-        slid = v - p.stiffness * abs(v) / g * z
-        z = min(max(z + dt * slid, -g / p.stiffness), g / p.stiffness)
-        force = p.stiffness * z + 2.0 * PRELOAD * np.sqrt(p.stiffness * p.mass) * slid
+        force, z = _friction(p, x, v, z, dt)
         force += p.viscous * v + p.weight * np.sin(x) + p.spring * x + p.tilt
         if held[0] <= i < held[1]:
             force += p.push
