@@ -61,8 +61,17 @@ class Path:
     @cached_property
     def stands(self) -> NDArray[np.bool_]:
         """In which blocks (n,) all readings around lie no farther apart than by noise."""
+        return np.asarray(self._still_samples.all(axis=1))
+
+    @property
+    def pauses(self) -> NDArray[np.bool_]:
+        """In which blocks (n,) the axis may stand for some of their samples."""
+        return np.asarray(self._still_samples.any(axis=1))
+
+    @property
+    def _still_samples(self) -> NDArray[np.bool_]:
         still = self._still
-        return np.asarray((still[:-1] & still[1:]).reshape(-1, self.samples).all(axis=1))
+        return (still[:-1] & still[1:]).reshape(-1, self.samples)
 
     @cached_property
     def _still(self) -> NDArray[np.bool_]:

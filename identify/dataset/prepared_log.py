@@ -175,7 +175,8 @@ def stands(motion: Motion) -> NDArray[np.bool_]:
     """In which blocks (n,) of a motion the axis may stick.
 
     Where noise alone makes velocities as large, the mean over as many blocks as it takes tells it:
-    an axis that sticks for some of them seems to dither.
+    an axis that sticks for some of them seems to dither. One that swings comes back too, but its
+    readings around lie farther apart than by noise.
     """
     still = at_rest(motion.velocity)
     least = REST_SPEED * float(np.abs(motion.velocity).max()) * motion.period
@@ -188,7 +189,8 @@ def stands(motion: Motion) -> NDArray[np.bool_]:
         edges = np.zeros(len(still) + 1)
         np.add.at(edges, held, 1.0)
         np.add.at(edges, held + over, -1.0)
-        still |= np.cumsum(edges)[:-1] > 0.0
+        back = np.cumsum(edges)[:-1] > 0.0
+        still |= back if motion.path is None else back & motion.path.pauses
     return still
 
 

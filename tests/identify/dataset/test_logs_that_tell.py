@@ -12,6 +12,7 @@ from planted_logs import RATE, RUBS, SLIDE, Ride, few, having, logged
 
 from identify import adding, workflow
 from identify.dataset.preparation import datasets
+from identify.dataset.prepared_log import moving
 from identify.dataset.spectrum import fitted_levels
 from identify.estimation.intervals import NotExcited
 from identify.estimation.offered import RestsTooOften
@@ -187,3 +188,17 @@ def test_what_acts_through_a_mass_is_not_tried_on_imposed_motion_and_the_answer_
     (note,) = [line for line in diagnose_text(found).splitlines() if "not tried" in line]
     assert "load_dependent_friction, payload_mass, as each acts through the motor" in note
     assert "mass = 0 kg says that the motion is imposed" in note
+
+
+@pytest.mark.parametrize(
+    ("hertz", "rest", "least", "most"), [(30.0, 0.0, 0.7, 1.0), (3.0, 0.5, 0.0, 0.2)]
+)
+def test_an_axis_that_swings_does_not_stand_and_one_that_pauses_does(hertz, rest, least, most):
+    """A swing comes back within each test function; a pause of 50 ms at each turn is in each."""
+    rng = np.random.default_rng(1)
+    height = 1.0 + 0.5 * np.sin(0.5 * T)
+    swing = height * np.sin(2.0 * np.pi * hertz * T)
+    place = 1e-3 * np.where(np.abs(swing) > rest, swing, 0.0)
+    log = log_of(RATE, place + 1e-5 * rng.standard_normal(len(T)), rng.standard_normal(len(T)))
+    (logged,) = datasets(BARE, {"log": log}, {})["x"].training
+    assert least <= moving([logged], sticks=True).mean() <= most
