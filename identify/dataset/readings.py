@@ -11,6 +11,7 @@ rounding of readings to a step, of step/pi at most.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from statistics import NormalDist, median_high
 
 import numpy as np
@@ -135,9 +136,14 @@ def ripple_periods(readings: Array) -> tuple[float, ...]:
     Only errors larger than those of rounding, and slower than every second step, as readings
     repeat with their steps by themselves.
     """
+    return _ripple_periods(np.asarray(readings[:ENOUGH], float).tobytes())
+
+
+@lru_cache(maxsize=16)  # logs, which the commands of one process and its axes ask for again
+def _ripple_periods(logged: bytes) -> tuple[float, ...]:
     # share of the differences' variance that a line takes; a weaker one makes no noise
     least = 0.01
-    readings = readings[:ENOUGH]
+    readings = np.frombuffer(logged)
     step = resolution_of(np.diff(readings))
     place, bend = readings[2:-2], np.diff(readings, 4)
     usual = usual_size(bend)

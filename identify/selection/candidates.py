@@ -30,7 +30,7 @@ from identify.estimation.scaling import AT_EDGE
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
 from twin.effect import Effect, Excitation, Kind
-from twin.knee import Imitation
+from twin.knee import Imitated, Imitation
 from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]
@@ -40,14 +40,25 @@ SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it 
 NO_SCORE = "by one linear step it gains too little"
 
 
+@dataclass(frozen=True)
+class NotItself:
+    """Why the values that a law was fitted with cannot be its own, in words.
+
+    imitated: what it is on this motion, where that is another law.
+    """
+
+    why: str
+    imitated: Imitated | None = None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate:
     """A model with one effect more: its fit, and what speaks for the effect.
 
     evidence, gain: Schwarz's criterion on the training logs, and the errors on the logs that were
     not fitted, for the report; neither decides. score: the acceptance test; None where one linear
-    step takes so little that no refit was made. doubt: why its values cannot be its own, in words;
-    None where they can.
+    step takes so little that no refit was made. doubt: why its values cannot be its own; None where
+    they can.
     """
 
     effect: Effect
@@ -56,7 +67,7 @@ class Candidate:
     evidence: Evidence
     gain: Gain
     score: Score | None = None
-    doubt: str | None = None
+    doubt: NotItself | None = None
 
     @classmethod
     def screened(cls, before: Judged, fit: Fit, effect: Effect, promise: float) -> Candidate:
@@ -78,12 +89,19 @@ class Candidate:
         """Why the data do not prove it, in words; None where they do."""
         if self.score is None:
             return NO_SCORE
-        return self.doubt or self.score.refused
+        return self.doubt.why if self.doubt else self.score.refused
 
     @property
     def supported(self) -> bool:
         """Whether the data prove the effect."""
         return self.refused is None
+
+    @property
+    def is_of_position(self) -> bool:
+        """Whether the data prove its force, and of that no more than that it is one of position."""
+        alike = self.doubt is not None and self.doubt.imitated is Imitated.OF_POSITION
+        proved = self.score is not None and self.score.accepted
+        return alike and proved and self.effect.kind is Kind.FORCE
 
     @property
     def part(self) -> float:
@@ -120,7 +138,7 @@ def candidate_of(
     )
 
 
-def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str | None:
+def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotItself | None:
     """Why the values that an effect was fitted with cannot be its own; None where they can.
 
     A value that ended at a bound belongs to another law, whatever the bound's sign; a strength at
@@ -130,21 +148,25 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> str |
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
         if imitation := imitation_of(fitted, ended, dataset.excitation):
-            return _told_as(imitation, fit.axis)
+            return NotItself(_told_as(imitation, fit.axis), imitation.of)
         if ended:
-            return f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound"
+            return NotItself(f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound")
         alone = replace(fit.axis, effects=(fitted,))
         if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
-            return "the motion repeats with it, so that any force of the motion could be it"
+            return NotItself(
+                "the motion repeats with it, so that any force of the motion could be it"
+            )
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
         if own_force and _is_of_the_file(alone, dataset):
-            return "a tenth more or less of what the bodies of the file weigh could be it"
+            return NotItself(
+                "a tenth more or less of what the bodies of the file weigh could be it"
+            )
         if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
-            return "it takes the place of the friction, which another friction would"
+            return NotItself("it takes the place of the friction, which another friction would")
     if _has_lost_inertia(before.fit, fit):
-        return "it takes the place of the inertia"
+        return NotItself("it takes the place of the inertia")
     if dataset.channel_delay > 0.0 and _is_late(effect):
-        return "the force acts before its time stamp, where it would act after it"
+        return NotItself("the force acts before its time stamp, where it would act after it")
     return None
 
 

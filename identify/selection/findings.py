@@ -24,13 +24,14 @@ from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
-from identify.selection.candidates import doubt
+from identify.selection.candidates import NotItself, doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.of_bodies import is_of_bodies
 from identify.selection.search import Found, Step
 from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
 from twin.curve import Coordinate
+from twin.knee import Imitated
 from twin.model.machine import AxisModel
 from twin.threads import trim_memory
 
@@ -117,7 +118,8 @@ class Finding:
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
     that curve, where it has such a parameter. left, left_fitted: over the noise floor, the error
     that all findings together leave on the logs that chose, and on the training logs. doubt: why
-    its values cannot be its own, in words; None where they can.
+    its values cannot be its own, in words; None where they can. imitated: what its law is on this
+    motion, where no more than that is proved.
     """
 
     effect: str
@@ -135,6 +137,7 @@ class Finding:
     left: float = 1.0
     left_fitted: float = 1.0
     doubt: str | None = None
+    imitated: Imitated | None = None
     parameter_units: dict[str, str] = field(default_factory=dict)
     equation: str = ""
 
@@ -239,6 +242,9 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
+    doubted = None if alone else _doubt(steps[0].change, less, final)
+    stands_for = doubted.imitated if doubted and steps[0].of_position else None
+    kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
         effect=name,
         tied=tuple(dict.fromkeys(other for other in tied if other != name)),
@@ -250,20 +256,23 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         parameter_units=axis.parameter_units(name),
         equation=axis[name].effect.equation,
         score=beside,
-        kind=FindingKind.MISSING if added else FindingKind.WRONG_SHAPE,
+        kind=FindingKind.RESEMBLES if stands_for else kind,
         together=tuple(others) if any(s.with_others for s in steps) else (),
-        doubt=None if alone else _doubt(steps[0].change, less, final),
+        doubt=doubted.why if doubted and not stands_for else None,
+        imitated=stands_for,
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)
     return finding
 
 
-def _doubt(change: Change, less: Judged, final: Judged) -> str | None:
-    """Why the values of a change cannot be its own, in words; None where they can."""
+def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
+    """Why the values of a change cannot be its own; None where they can."""
     own = doubt(less, final.fit, change.effect, parameters(change))
     if own is None and is_of_bodies(less, final, change.effect):
-        return "another rotor, or bodies with values within a tenth of the file's, explain as much"
+        return NotItself(
+            "another rotor, or bodies with values within a tenth of the file's, explain as much"
+        )
     return own
 
 

@@ -61,7 +61,8 @@ class Step:
     with_others: whether it is accepted only together with another step. held: whether a later free
     curve can make its force too, and so tells nothing against it. dropped: names of earlier changes
     that were not needed any more beside it. kin: the others that do nearly as well; a law that ends
-    in another shape resembles any of them.
+    in another shape resembles any of them. of_position: whether it stands for a force of position,
+    of which the motion does not tell that it is this law.
     """
 
     tried: Tried
@@ -70,6 +71,7 @@ class Step:
     held: bool = False
     dropped: tuple[str, ...] = ()
     kin: tuple[Tried, ...] = ()
+    of_position: bool = False
 
     @property
     def change(self) -> Change:
@@ -181,7 +183,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         if not steps:
             doubted = (c for c in ranking if c.effect.name in found.barred)
             first, ranking = judged, ordered([*candidates, *doubted])
-        new = _accepted(judged, last) or _together(judged, last, trial, step)
+        new = _accepted(judged, last) or _together(judged, last, trial, step) or _of_position(last)
         if not new:
             break
         passed += new
@@ -303,6 +305,12 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
     others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
     return [Step(first, others, kin=alike)]
+
+
+def _of_position(tried: Sequence[Tried]) -> list[Step]:
+    """The step of a force of position that is proved, where no law is that could be itself."""
+    proved = [t for t in tried if t.candidate.is_of_position]
+    return [Step(_best_of(proved), of_position=True)] if proved else []
 
 
 def simplest(tied: Sequence[Tried]) -> Tried:

@@ -159,7 +159,7 @@ def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1
     if not fit.at_floor:
         after = settled(after)
     found = candidate_of(judged, after, change.effect, parameters(change), among)
-    if found.supported and found.score:
+    if found.score and (found.supported or found.is_of_position):
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
     return Tried(change, screening, after, found)

@@ -47,6 +47,9 @@ def _explained(finding: Finding) -> str:
         if finding.bend:
             shape = "with {} in place of {}; that law".format(*_exponents_in_words(finding.bend))
         what = f"what is missing resembles {finding.effect}, {shape}"
+        if finding.imitated and not finding.shape:
+            here = f"as {finding.effect} is here; that law"
+            what = f"what is missing is {finding.imitated.value}, {here}"
     if finding.kind is FindingKind.WRONG_SHAPE:
         what = f"{finding.effect} has another shape: a free curve beside its law"
         without, with_it = "with the law", "with the curve"

@@ -13,7 +13,10 @@ from planted_logs import FIRST, HARDWARE, RATE, SLIDE, Ride, asked, begun, few, 
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, fit_axis, fit_themselves, turned
+from identify.output.words.findings import finding_in_words
+from identify.selection.findings import FindingKind
 from identify.selection.trying import try_effect
+from twin.knee import Imitated
 from twin.logs import Log
 from twin.model.machine import AxisModel
 
@@ -48,6 +51,17 @@ def test_what_does_not_slip_within_the_travel_is_a_spring(known):
     assert found.answers == tuple((name,) for name in known)
     refused = {c.effect.name: c.refused for c in found.ranking}
     assert all(refused[name].endswith("so that it is a spring here") for name in sticking)
+
+
+@pytest.mark.parametrize(("pitch", "imitated"), [(0.05, Imitated.OF_POSITION), (0.03, None)])
+def test_what_repeats_too_few_times_is_told_as_a_force_of_position(pitch, imitated):
+    """It was "unexplained". Whether it repeats, 2.1 cycles do not tell, 3.5 do; pitch: m."""
+    true = having(SLIDE, "cogging", p=pitch, a1=0.4)
+    (finding,) = asked(SLIDE, true, few("cogging", "quadratic_drag"), ride=SHORT).findings
+    assert (finding.effect, finding.imitated) == ("cogging", imitated)
+    assert finding.kind is (FindingKind.RESEMBLES if imitated else FindingKind.MISSING)
+    told = "what is missing is a force of position, as cogging is here"
+    assert finding_in_words(finding)[0].startswith(told if imitated else "cogging explains")
 
 
 @pytest.mark.slow
