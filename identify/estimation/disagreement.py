@@ -205,6 +205,9 @@ def _against(
     if gain is not None:
         usual, scatter = _among(best, others, theirs)
         own_value = _otherwise(best, gain - usual, own, axis, where)
+        # What a model lacks looks like some delay or gain of a log whose force hardly changes.
+        if own_value and isinstance(own_value.what, Recorded) and rms(left) < most:
+            own_value = None
         change = abs(_gains(own, left, near)[0][best] - usual) if near.any() else 0.0
         far = change > more * CLEAR * scatter
         if own_value and far and change > _least_change(best, own, own_value, where):
