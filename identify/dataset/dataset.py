@@ -93,6 +93,8 @@ class Dataset:
 
         Without selection logs, blocks of the training logs choose.
         """
+        if any(log.motion.name == name for log in self.test):
+            return replace(self, test=tuple(g for g in self.test if g.motion.name != name))
         training, selection, test = (
             tuple(log for log in self.having(role) if log.motion.name != name) for role in Role
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
 
@@ -63,3 +64,7 @@ class Disagreement:
         """
         far = 4.0  # times the error of the others
         return self.times > far and (self.otherwise is not None or self.span is not None)
+
+    def is_sure_beside(self, laws: Collection[str]) -> bool:
+        """Whether it is sure, and its own value is of none of these laws, by names of effects."""
+        return self.is_sure and (self.otherwise is None or self.otherwise.effect not in laws)

@@ -6,7 +6,8 @@ beyond the base the final model holds what the findings name, and nothing else. 
 doubted may be asked for once more, when another was found since.
 
 The test logs decide nothing of what is proposed. They can refuse it: what makes their error larger
-is contradicted, and the final model is without it.
+is contradicted, and the final model is without it. A test log that was recorded otherwise than the
+others, beside all that these prove, is no witness.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass, field, replace
 
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import SETTLED, fit_aligned, realigned
+from identify.estimation.disagreement import odd_in
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, finished
@@ -69,10 +71,10 @@ def concluded(
         ended = _explained(found)
         if weakest := _weakest(ended, found):
             name, found = weakest.effect, without_law(weakest.effect, found)
-            doubts[name] = Doubt(_why(weakest), _laws(found), again=name in doubts)
-        asked = {n for n, d in doubts.items() if not d.again and d.beside != _laws(found)}
+            doubts[name] = Doubt(_why(weakest), laws_of(found), again=name in doubts)
+        asked = {n for n, d in doubts.items() if not d.again and d.beside != laws_of(found)}
         if not weakest and not asked:
-            told = {name: doubt.why for name, doubt in doubts.items() if name not in _laws(found)}
+            told = {name: doubt.why for name, doubt in doubts.items() if name not in laws_of(found)}
             return _refused(replace(ended, doubted=told), found)
         barred = doubts.keys() - asked
         doubts |= {name: replace(doubts[name], again=True) for name in asked}
@@ -112,7 +114,7 @@ def _is_level(one: Fit, other: Fit, dataset: Dataset) -> bool:
     return rms(moved) < same * other.error
 
 
-def _laws(found: Found) -> frozenset[str]:
+def laws_of(found: Found) -> frozenset[str]:
     """Names of the laws of which a change was found."""
     return frozenset(s.change.name for s in found.steps)
 
@@ -152,6 +154,10 @@ def _refused(ended: Conclusion, found: Found) -> Conclusion:
     against = [f for f in ended.findings if f.state is Confirmation.CONTRADICTED]
     if not against:
         return ended
+    if (spoiled := _spoiled_witness(found)) is not None:
+        found = replace(found, dataset=found.dataset.without(spoiled))
+        again = replace(_explained(found), doubted=ended.doubted, contradicted=ended.contradicted)
+        return _refused(again, found)
     worst = max(against, key=lambda f: f.tested.after / f.tested.before)
     found, doubted = _at_its_best(without_law(worst.effect, found)), dict(ended.doubted)
     rest = _explained(found)
@@ -161,6 +167,13 @@ def _refused(ended: Conclusion, found: Found) -> Conclusion:
         rest = _explained(found)
     told = replace(rest, doubted=doubted, contradicted=(*ended.contradicted, worst))
     return _refused(told, found)
+
+
+def _spoiled_witness(found: Found) -> str | None:
+    """The test log that is surely otherwise than the others, beside what they prove, if one is."""
+    odd = odd_in(found.final.fit.axis, found.dataset)
+    test = {log.motion.name for log in found.dataset.test}
+    return odd.log if odd and odd.log in test and odd.is_sure_beside(laws_of(found)) else None
 
 
 def _with_own_noise(found: Found) -> Found:

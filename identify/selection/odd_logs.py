@@ -16,7 +16,7 @@ from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
 from identify.estimation.disagreement import odd_in, suspect
 from identify.estimation.fit import Fit, fit_axis
-from identify.selection.doubts import Conclusion
+from identify.selection.doubts import Conclusion, laws_of
 
 MOST_TURNS = 3  # of leaving out and asking again
 
@@ -30,21 +30,26 @@ def without_odd_log(
     """
     odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
-        left_out = _spoiling(odd)
+        left_out = _spoiling(odd, dataset)
         ended = conclude(*_others(base, dataset, left_out))
         odd = _odd_beside(ended, dataset)
-        if left_out == _spoiling(odd):
+        if left_out == _spoiling(odd, dataset):
             break
     else:
         ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
-    if _spoiling(odd) is None and _is_unexplained(ended):
+    if _spoiling(odd, dataset) is None and _is_unexplained(ended):
         return _without_suspect(base, dataset, conclude) or (ended, odd)
     return ended, odd
 
 
-def _spoiling(odd: Disagreement | None) -> str | None:
-    """The log that is left out for how it disagrees; what happens at rest spoils nothing."""
-    return odd.log if odd and not odd.at_rest else None
+def _spoiling(odd: Disagreement | None, dataset: Dataset) -> str | None:
+    """The log that is left out for how it disagrees.
+
+    What happens at rest spoils nothing; nor does a test log, as it decides nothing.
+    """
+    if odd is None or odd.at_rest or odd.log in {log.motion.name for log in dataset.test}:
+        return None
+    return odd.log
 
 
 def _is_unexplained(ended: Conclusion) -> bool:
@@ -67,16 +72,14 @@ def _without_suspect(
         return None
     ended = conclude(*_others(base, dataset, name))
     odd = _odd_beside(ended, dataset)
-    if not ended.findings or odd is None or odd.log != name or not odd.is_sure:
+    if not ended.findings or odd is None or odd.log != name:
         return None
-    laws = {step.change.name for step in ended.found.steps}
-    own = odd.otherwise is not None and odd.otherwise.effect in laws
-    return None if own else (ended, odd)
+    return (ended, odd) if odd.is_sure_beside(laws_of(ended.found)) else None
 
 
 def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]:
-    """The fit of the logs but an odd one, and these; a test log stays, as it decides nothing."""
-    if odd is None or odd in {log.motion.name for log in dataset.test}:
+    """The fit of the logs but an odd one, and these."""
+    if odd is None:
         return base, dataset
     rest = dataset.without(odd)
     if [*rest.training] == [*dataset.training]:

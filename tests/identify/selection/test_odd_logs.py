@@ -148,6 +148,20 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
 
 
+def test_a_late_test_log_contradicts_nothing_and_is_told() -> None:
+    """Late by a quarter of a pitch at speed, of the cogging that it would refute."""
+    logs = runs(having(SLIDE, "cogging", p=0.02, a1=0.8))
+    late = with_force(logs.pop("run3"), lambda force: np.roll(force, 30))
+    held = {"run2": logs.pop("run2")}
+    found = identify.diagnose(MODEL, logs, held, {"late": late}, catalogue=FEW).axes["x"]
+    assert found.answers == (("cogging",),)
+    assert not found.contradicted
+    assert found.dataset.odd is not None
+    assert found.dataset.odd.log == "late"
+    assert found.dataset.odd.otherwise is not None
+    assert found.dataset.odd.otherwise.there == pytest.approx(30 / RATE, rel=0.2)
+
+
 @pytest.mark.slow
 def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
     machine = having(SLIDE, "cogging", p=0.02, a1=0.3)
