@@ -29,6 +29,7 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
+from twin.curve import Coordinate
 from twin.effect import Effect, Excitation, Kind
 from twin.knee import Imitated, Imitation
 from twin.model.machine import AxisModel, Fitted
@@ -161,6 +162,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
             return NotItself(
                 "a tenth more or less of what the bodies of the file weigh could be it"
             )
+        if own_force and _is_between_knots(fitted, fit.axis, dataset):
+            return NotItself("a free curve beside it may miss as much between its knots")
         if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
             return NotItself("it takes the place of the friction, which another friction would")
     if _has_lost_inertia(before.fit, fit):
@@ -206,6 +209,23 @@ def _is_of(force: Array, columns: Array) -> bool:
     """Whether most of a force (n,) N is in the span of some columns (n, k)."""
     left = unabsorbed(force, orthonormal(columns))
     return float(left @ left) < SAME_FORCE * float(force @ force)
+
+
+def _is_between_knots(law: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
+    """Whether a force is no larger than what a free curve over its coordinate may miss.
+
+    Between two knots a smooth curve is off the straight line by an eighth of its second difference.
+    """
+    over = {curve.over for curve in law.effect.curves}
+    size = rms(averaged_force(replace(axis, effects=(law,)), dataset.training))
+    return any(
+        size < 0.125 * float(np.abs(np.diff(strengths, 2)).max(initial=0.0))
+        for f in axis.effects
+        if f.effect.free_shape
+        and not law.effect.free_shape
+        and (Coordinate.SPEED if f.values["per_speed"] else Coordinate.POSITION) in over
+        for strengths in ([f.values[n] for n in part.strengths] for part in f.effect.parts)
+    )
 
 
 def _is_of_the_file(alone: AxisModel, dataset: Dataset) -> bool:

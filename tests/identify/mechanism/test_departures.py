@@ -45,7 +45,7 @@ def named(found):
     return [(m.group.what, m.group.place) for m in found.moved]
 
 
-@pytest.mark.short(2)
+@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("changed", "right"),
     [

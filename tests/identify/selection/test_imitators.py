@@ -65,6 +65,14 @@ def test_what_repeats_too_few_times_is_told_as_a_force_of_position(pitch, imitat
 
 
 @pytest.mark.slow
+def test_what_a_free_curve_misses_between_its_knots_is_no_cogging():
+    """A spring of another shape, and with 99 % two coggings of 4 mN, three knots a period."""
+    true = having(SLIDE, "cogging", p=0.0545, a1=0.4)
+    found = asked(SLIDE, true, few("cogging", "spring"), ride=SHORT)
+    assert found.answers == (("spring",),)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imitator", "mass", "gain", "told"),
     [
