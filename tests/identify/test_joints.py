@@ -280,7 +280,7 @@ def test_what_masses_that_are_off_could_make_is_no_effect_of_a_joint(folder, pla
     made = fit(load_model(folder / "arm.toml"), {"1": arm_log(1, **planted)})
     spring = load_catalogue()["spring"]
     found = try_effect(made.fits["shoulder"], made.datasets["shoulder"], spring)
-    assert found.doubt is None if refused is None else refused in found.doubt
+    assert found.doubt is None if refused is None else refused in found.refused
 
 
 @pytest.mark.parametrize(
