@@ -24,18 +24,18 @@ LONGEST_WAIT = 300.0  # s for what another worker compiles
 LONGEST = (
     "test_types",
     "test_readme",
-    "test_catalogue_recovery",
     "test_catalogue_laws",
-    "test_report",
-    "test_silent_logs",
+    "test_odd_logs",
+    "test_catalogue_recovery",
+    "test_import_guess",
+    "test_departures",
+    "test_tables",
+    "test_one_dataset",
+    "test_recording",
     "test_points",
-    "test_emps_product",
-    "test_roles",
+    "test_imitators",
     "test_user_effects",
-    "test_joints",
-    "test_plan",
-    "test_search",
-    "test_rooms",
+    "test_emps_product",
 )
 
 
