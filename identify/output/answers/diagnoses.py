@@ -31,6 +31,7 @@ from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind
 from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
+from twin.knee import Imitated
 from twin.model.file import format_model
 
 
@@ -206,6 +207,8 @@ class FindingEntry(Entry):
     together: list[str]
     """Effects without which the logs do not prove it."""
     bend: BendEntry | None
+    imitated: Imitated | None
+    """What its law is on this motion, where no more than that is proved."""
     indistinguishable_from: list[str] = read("tied")
     state: Confirmation
     test_error_before: Number = read("tested.before")
