@@ -175,6 +175,16 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     return not larger and not rest.size_is_predictable()
 
 
+def foretells_aliases(fit: Fit, dataset: Dataset) -> bool:
+    """Whether something measured predicts what is left, where most of the noise floor is aliases.
+
+    These are told from a spectrum, which a force that the model lacks may resemble.
+    """
+    if fit.noise.parts["aliasing"] ** 2 < 0.5 * fit.noise.value**2:
+        return False
+    return Remainder.of(fit, (*dataset.training, *dataset.selection)).is_predictable()
+
+
 def _hidden(fit: Fit, logs: Sequence[PreparedLog]) -> bool:
     """Whether one log, louder than the others, hides what something measured predicts of them."""
     left = [error_on(fit.axis, [log]) for log in logs]

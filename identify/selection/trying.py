@@ -14,6 +14,7 @@ from identify.dataset.drive import knows_rounding
 from identify.estimation.alignment import moved_by
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves, turned
 from identify.estimation.free_curves import shapes_of
+from identify.estimation.residual_noise import foretells_aliases
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
@@ -83,7 +84,7 @@ def tried_beside(
     held = (c for c in freed_of(judged.fit.axis) if c.name not in barred)
     freed = [c for c in held if not c.is_strength or c.name in trial.catalogue]
     changes: list[Change] = [*plain, *freed]
-    if judged.at_floor:
+    if judged.at_floor and not foretells_aliases(judged.fit, judged.dataset):
         changes = []
     controls = ControlTest.beside(judged)
     trying = partial(progress, "trying changes")

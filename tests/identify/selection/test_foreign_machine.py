@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import identify
+from benchmarks import silence
 from benchmarks.drives import row
 from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
 from benchmarks.second_simulator.drives import Recorder
@@ -43,6 +44,13 @@ def test_noise_of_the_force_is_no_friction_that_grows_with_it(hidden: str) -> No
     """A servo of 1 kHz logged at 200 Hz: what thinning folds into its force is half of it."""
     found = row("servo", hidden, Recorder(200, 1000), 1)
     assert not [f for f in found["findings"] if f["mark"] == "wrong"]
+
+
+@pytest.mark.slow
+def test_what_something_foretells_is_no_alias_of_the_command() -> None:
+    """A servo of 4 kHz logged at 2 kHz, within 1.2 floors: its spring was told as noise."""
+    found = silence.row(silence.cases(91, 9)[8])
+    assert found["mark"] in {"right", "equivalent"}
 
 
 # A drive as many are: dry friction that sticks at each turn, and an encoder of a micrometre
