@@ -243,7 +243,8 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
     doubted = None if alone else _doubt(steps[0].change, less, final)
-    stands_for = doubted.imitated if doubted and steps[0].of_position else None
+    here = doubted.imitated if doubted and steps[0].of_position else None
+    stands_for = here if here is Imitated.OF_POSITION else None
     kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
         effect=name,
