@@ -93,7 +93,7 @@ class Dataset:
 
         Without selection logs, blocks of the training logs choose.
         """
-        if any(log.motion.name == name for log in self.test):
+        if self.is_test(name):
             return replace(self, test=tuple(g for g in self.test if g.motion.name != name))
         training, selection, test = (
             tuple(log for log in self.having(role) if log.motion.name != name) for role in Role
@@ -123,6 +123,10 @@ class Dataset:
             for logs in (self.selection, self.training)
         )
         return replace(self, training=fit, selection=held)
+
+    def is_test(self, name: str) -> bool:
+        """Whether the log of a name is a test log, which decides nothing."""
+        return any(log.motion.name == name for log in self.test)
 
     def kept_in(self, axis: AxisModel) -> AxisModel:
         """An axis that was found on these logs, with what others need to tell the same errors."""

@@ -87,7 +87,7 @@ def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
     if (odd := disagreeing(axis, deciding)) is not None:
         return odd
     odd = disagreeing(axis, dataset.logs) if dataset.test else None
-    if odd and odd.log in {log.motion.name for log in dataset.test}:
+    if odd and dataset.is_test(odd.log):
         return odd
     return _at_rest(axis, deciding)
 

@@ -51,6 +51,23 @@ class NotItself:
     why: str
     imitated: Imitated | None = None
 
+    @classmethod
+    def imitating(cls, imitation: Imitation, axis: AxisModel) -> NotItself:
+        """Of an effect of an axis that is another law there."""
+        knee, unit = imitation.knee, axis.units(imitation.knee.unit)
+        size, edge = (
+            f"{v:.3g} {unit}".removesuffix(" 1") for v in (imitation.size, imitation.edge)
+        )
+        side = "below" if imitation.size < imitation.edge else "beyond"
+        value, is_here = "" if size == edge else f" of {size}", imitation.of
+        why = f"its {knee.name}{value} is {side} {edge}, so that it is {is_here.value} here"
+        return cls(why, is_here)
+
+    @property
+    def is_of_position(self) -> bool:
+        """Whether it is a force of position all the same."""
+        return self.imitated is Imitated.OF_POSITION
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate:
@@ -100,7 +117,7 @@ class Candidate:
     @property
     def is_of_position(self) -> bool:
         """Whether the data prove its force, and of that no more than that it is one of position."""
-        alike = self.doubt is not None and self.doubt.imitated is Imitated.OF_POSITION
+        alike = self.doubt is not None and self.doubt.is_of_position
         proved = self.score is not None and self.score.accepted
         return alike and proved and self.effect.kind is Kind.FORCE
 
@@ -149,7 +166,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
         if imitation := imitation_of(fitted, ended, dataset.excitation):
-            return NotItself(_told_as(imitation, fit.axis), imitation.of)
+            return NotItself.imitating(imitation, fit.axis)
         if ended:
             return NotItself(f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound")
         alone = replace(fit.axis, effects=(fitted,))
@@ -187,15 +204,6 @@ def imitation_of(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> I
     ]
     found = (effect.imitation(each, covered) for each in (values, *past))
     return next((one for one in found if one), None)
-
-
-def _told_as(imitation: Imitation, axis: AxisModel) -> str:
-    """What an effect of an axis is where it is not itself, in words."""
-    knee, unit = imitation.knee, axis.units(imitation.knee.unit)
-    size, edge = (f"{v:.3g} {unit}".removesuffix(" 1") for v in (imitation.size, imitation.edge))
-    side = "below" if imitation.size < imitation.edge else "beyond"
-    value = "" if size == edge else f" of {size}"
-    return f"its {knee.name}{value} is {side} {edge}, so that it is {imitation.of.value} here"
 
 
 def _follows_motion(alone: AxisModel, dataset: Dataset) -> bool:

@@ -172,8 +172,9 @@ def _refused(ended: Conclusion, found: Found) -> Conclusion:
 def _spoiled_witness(found: Found) -> str | None:
     """The test log that is surely otherwise than the others, beside what they prove, if one is."""
     odd = odd_in(found.final.fit.axis, found.dataset)
-    test = {log.motion.name for log in found.dataset.test}
-    return odd.log if odd and odd.log in test and odd.is_sure_beside(laws_of(found)) else None
+    if odd is None or not found.dataset.is_test(odd.log):
+        return None
+    return odd.log if odd.is_sure_beside(laws_of(found)) else None
 
 
 def _with_own_noise(found: Found) -> Found:

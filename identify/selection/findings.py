@@ -243,8 +243,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
     doubted = None if alone else _doubt(steps[0].change, less, final)
-    here = doubted.imitated if doubted and steps[0].of_position else None
-    stands_for = here if here is Imitated.OF_POSITION else None
+    stands_in = doubted is not None and doubted.is_of_position and steps[0].of_position
     kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
         effect=name,
@@ -257,10 +256,10 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         parameter_units=axis.parameter_units(name),
         equation=axis[name].effect.equation,
         score=beside,
-        kind=FindingKind.RESEMBLES if stands_for else kind,
+        kind=FindingKind.RESEMBLES if stands_in else kind,
         together=tuple(others) if any(s.with_others for s in steps) else (),
-        doubt=doubted.why if doubted and not stands_for else None,
-        imitated=stands_for,
+        doubt=doubted.why if doubted and not stands_in else None,
+        imitated=doubted.imitated if doubted and stands_in else None,
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)

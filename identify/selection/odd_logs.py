@@ -47,7 +47,7 @@ def _spoiling(odd: Disagreement | None, dataset: Dataset) -> str | None:
 
     What happens at rest spoils nothing; nor does a test log, as it decides nothing.
     """
-    if odd is None or odd.at_rest or odd.log in {log.motion.name for log in dataset.test}:
+    if odd is None or odd.at_rest or dataset.is_test(odd.log):
         return None
     return odd.log
 
