@@ -62,7 +62,8 @@ class Machine:
 def machine(seed: int, number: int) -> Machine:
     """A machine of a seed."""
     rng = np.random.default_rng([seed, number])
-    arm = drawn(rng, 2 + number % 3, RATES[number % len(RATES)])
+    joints = 2 + (number + number // len(CHANGES)) % 6  # 2 to 7, each beside each change in time
+    arm = drawn(rng, joints, RATES[number % len(RATES)])
     changed, right = Changed(), list[tuple[Told, ...]]()
     for what in CHANGES[number % len(CHANGES)]:
         changed, told = _change(what, arm, changed, rng)

@@ -3,7 +3,8 @@
 The drives of ``drives``, each diagnosed twice with one model: with the one log to fit and the other
 to choose, and the other way round. Two answers are the same where each finding of the one is named,
 or told to be level, by one of the other. A finding that only one has may be told to depend on which
-log chooses: by the answer that has it, or by both.
+log chooses: by the answer that has it, or by both; or the other may tell that its test log refuses
+it, which is why it is not there.
 """
 
 from __future__ import annotations
@@ -20,15 +21,16 @@ from benchmarks.judgement import NUMBER, Row
 from benchmarks.second_simulator.drives import DRIVES, Recorder, log_of
 from identify.analysis.first_model import first_model
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.findings import Finding
 from identify.workflow import diagnose
 
 TITLE = "Which of two logs chooses"
 SEED = 64
 
 
-def families(found: AxisDiagnosis) -> list[frozenset[str]]:
+def families(findings: Sequence[Finding]) -> list[frozenset[str]]:
     """Of each finding its effect and those that are level with it."""
-    return [frozenset(NUMBER.sub("", n) for n in (f.effect, *f.tied)) for f in found.findings]
+    return [frozenset(NUMBER.sub("", n) for n in (f.effect, *f.tied)) for f in findings]
 
 
 def same(one: Sequence[frozenset[str]], other: Sequence[frozenset[str]]) -> bool:
@@ -39,9 +41,9 @@ def same(one: Sequence[frozenset[str]], other: Sequence[frozenset[str]]) -> bool
 
 
 def alone(here: AxisDiagnosis, there: AxisDiagnosis) -> set[str]:
-    """Effects that one answer names and the other does not."""
-    other = families(there)
-    named = zip(here.findings, families(here), strict=True)
+    """Effects that one answer names and the other neither names nor tells to be contradicted."""
+    other = [*families(there.findings), *families(there.contradicted)]
+    named = zip(here.findings, families(here.findings), strict=True)
     return {f.effect for f, family in named if not any(family & b for b in other)}
 
 
@@ -55,14 +57,15 @@ def row(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
         diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"]
         for pair in ((one, other), (other, one))
     ]
+    answers = [families(answer.findings) for answer in found]
     own = [{law.effect for law in answer.by_roles} for answer in found]
     lone = [alone(*found), alone(*found[::-1])]
     return {
         "case": f"{name} at {recorder.rate} Hz, {hidden}",
-        "same": same(*map(families, found)),
+        "same": same(*answers),
         "told": all(effects <= says for effects, says in zip(lone, own, strict=True)),
         "told by both": all(effects <= says for effects in lone for says in own),
-        "answers": [[sorted(family) for family in families(answer)] for answer in found],
+        "answers": [[sorted(family) for family in answer] for answer in answers],
         "by roles": [sorted(says) for says in own],
     }
 
