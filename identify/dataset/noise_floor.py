@@ -62,6 +62,11 @@ class NoiseFloor:
     parts: Mapping[str, float]
 
     @property
+    def sure(self) -> float:
+        """The error, N RMS, from which it is surely more than noise."""
+        return max(RULE.at_floor * self.value, self.most)
+
+    @property
     def known(self) -> float:
         """What is known to make noise, N RMS: all of it but the force that no sensor makes.
 

@@ -173,7 +173,7 @@ class Fit:
     @property
     def at_floor(self) -> bool:
         """Whether the error is at the noise floor, or within what is sure of it."""
-        return self.error < max(RULE.at_floor * self.floor, self.noise.most)
+        return self.error < self.noise.sure
 
     @property
     def ratio(self) -> float:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from identify.dataset.dataset import Dataset, Role
+from identify.dataset.noise_floor import noise_beside
 from identify.estimation.errors import Errors, error_in
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
@@ -97,11 +98,14 @@ class FindingKind(Enum):
 class Confirmation(Enum):
     """What the test logs, on which nothing was decided, say of a finding.
 
-    With it their error falls; or it rises; or it is as before, or there are none.
+    With it their error falls; or it rises to more than noise, or within noise; or it is as before,
+    or there are none. Noise contradicts nothing: a law with memory makes some of what the readings
+    do not tell of the path.
     """
 
     CONFIRMED = "confirmed"
     CONTRADICTED = "contradicted"
+    WITHIN_NOISE = "within_noise"
     UNTESTED = "untested"
 
 
@@ -116,7 +120,8 @@ class Finding:
     names of the findings without which it is not accepted. parameters, parameter_units, equation:
     of its law.
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
-    that curve, where it has such a parameter. left, left_fitted: over the noise floor, the error
+    that curve, where it has such a parameter. noise: the error of the test logs, in ``unit``, above
+    which it is surely more than noise. left, left_fitted: over the noise floor, the error
     that all findings together leave on the logs that chose, and on the training logs. doubt: why
     its values cannot be its own, in words; None where they can. imitated: what its law is on this
     motion, where no more than that is proved.
@@ -134,6 +139,7 @@ class Finding:
     together: tuple[str, ...] = ()
     shape: FoundShape | None = None
     bend: FreeExponent | None = None
+    noise: float = 0.0
     left: float = 1.0
     left_fitted: float = 1.0
     doubt: str | None = None
@@ -147,7 +153,9 @@ class Finding:
         before, after = self.tested.before, self.tested.after
         if self.tested.on is not Role.TEST or not min(before, after) < BETTER * max(before, after):
             return Confirmation.UNTESTED
-        return Confirmation.CONFIRMED if after < before else Confirmation.CONTRADICTED
+        if after < before:
+            return Confirmation.CONFIRMED
+        return Confirmation.CONTRADICTED if after > self.noise else Confirmation.WITHIN_NOISE
 
     @property
     def refused(self) -> str | None:
@@ -184,7 +192,9 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     dataset, final = found.dataset, found.final
     least = error_in(dataset.chosen_on, final.fit, dataset)
     left = least / (final.other_floor if dataset.selection else final.fit.floor)
-    return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
+    ratio = final.fit.ratio
+    noise = noise_beside(final.fit.axis, dataset.test).sure if dataset.test else 0.0
+    return tuple(replace(f, noise=noise, left=left, left_fitted=ratio) for f in out)
 
 
 def without_law(name: str, found: Found) -> Found:
@@ -230,8 +240,8 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
     trim_memory()
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
-    noise = steps[0].tried.candidate.is_noise  # which lowers no error
-    alone = noise or any(step.held for step in steps)  # then the others tell nothing against it
+    is_noise = steps[0].tried.candidate.is_noise  # which lowers no error
+    alone = is_noise or any(step.held for step in steps)  # then the others tell nothing against it
     beside = own if alone else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     whole = error_in(tested.on, found.base.fit, dataset)

@@ -361,8 +361,8 @@ def _together(
         score, enough = t.candidate.score, RULE.promise * RULE.least_part
         return score is not None and score.t > 0.0 and score.part > enough and not t.candidate.doubt
 
-    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)[:LEADERS]
-    for way in ways:
+    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)
+    for way in ways[:LEADERS]:
         with_it = replace(trial, taken=(*trial.taken, way.change.name))
         beside, seconds, _ = tried_beside(
             way.judged, with_it, within(progress, f"beside {way.change.name}")
@@ -375,7 +375,10 @@ def _together(
             continue
         alone = refitted_on(axis, both)
         if _is_needed(way.change, alone, both):
-            return [Step(way, with_others=True), replace(second, with_others=True)]
+            # None of them was proved when it was chosen: they are compared again beside the second.
+            near = NEARLY * way.candidate.part
+            level = tuple(t for t in ways if t is not way and t.candidate.part >= near)
+            return [Step(way, level, with_others=True), replace(second, with_others=True)]
     return []
 
 

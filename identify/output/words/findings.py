@@ -62,6 +62,7 @@ def _explained(finding: Finding) -> str:
         with_it, without = "with the value of the logs", "with that of the file"
     how = {
         Confirmation.CONTRADICTED: "is contradicted by the test logs",
+        Confirmation.WITHIN_NOISE: "is not contradicted by the test logs, whose error is noise",
         Confirmation.UNTESTED: "is not tested by the test logs, whose error hardly changes",
     }.get(finding.state)
     if how is None or tested.on is not Role.TEST:

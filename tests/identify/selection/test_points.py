@@ -14,6 +14,8 @@ from planted_logs import HARDWARE, NOISE, RATE, RUBS, SLIDE, Ride, asked, begun,
 from scipy.signal import lfilter
 
 import identify
+from identify.dataset.dataset import Role
+from identify.estimation.errors import Errors
 from identify.estimation.fit import fit_axis
 from identify.estimation.found_shape import found_shape
 from identify.estimation.free_curves import shapes_of
@@ -22,7 +24,7 @@ from identify.output.words.findings import finding_in_words
 from identify.output.words.next_step import WRITE, next_commands
 from identify.output.words.verdict import verdict_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
-from identify.selection.findings import Confirmation, FindingKind
+from identify.selection.findings import Confirmation, Finding, FindingKind
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -278,6 +280,33 @@ def test_what_test_logs_contradict_is_told_and_not_in_the_model() -> None:
             (("cogging",), ("cogging",)) if confirmed else ((), found.base.axis.names[-1:])
         )
         assert ("were right" in told[1]) is confirmed
+
+
+@cache
+def confirmed() -> Finding:
+    """A cogging that the test log confirms."""
+    true = having(SLIDE, "cogging", p=0.021, a1=0.03, b1=0.02)
+    one, held, test = ({str(i): logged(true, Ride(i))} for i in (1, 2, 3))
+    (finding,) = diagnose_axis(*begun(SLIDE, one, held, test), few("cogging")).findings
+    return finding
+
+
+@pytest.mark.parametrize(
+    ("after", "state"),
+    [
+        (0.5, Confirmation.CONFIRMED),
+        (1.001, Confirmation.UNTESTED),
+        (1.3, Confirmation.WITHIN_NOISE),
+        (1.6, Confirmation.CONTRADICTED),
+    ],
+)
+def test_noise_contradicts_nothing(after: float, state: Confirmation) -> None:
+    """A stiff bristle makes noise of the path, of which the model without it has none."""
+    named = confirmed()
+    assert named.noise == pytest.approx(1.3 * NOISE / 20**0.5, rel=0.3)  # of 20 samples and more
+    found = replace(named, tested=Errors(1.0, after, Role.TEST), noise=1.5)
+    assert found.state is state
+    assert (found.confidence is None) is (state is Confirmation.CONTRADICTED)
 
 
 # 8. Bumps of another form, and coloured noise.

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from planted_logs import SLIDE, Ride, begun, few, having, logged
+import pytest
+from planted_logs import CATALOGUE, SLIDE, Ride, begun, few, having, logged
 
+import identify
+from benchmarks.drives import HIDDEN
+from benchmarks.second_simulator.drives import DRIVES, log_of
+from identify.analysis.first_model import first_model
 from identify.selection.changes import Added, Reshaped
 from identify.selection.search import search
 from identify.selection.ties import with_ties
@@ -39,3 +44,20 @@ def test_another_shape_goes_with_the_friction_that_it_was_of() -> None:
     told = with_ties(replace(found, steps=steps))
     assert [s.change.name for s in told.steps] == ["lugre"]
     assert told.final.fit.axis.names == ("lugre",)
+
+
+@pytest.mark.slow
+def test_what_came_near_is_compared_again_beside_the_other_of_a_pair() -> None:
+    """Neither a late motor nor its friction is proved alone, and a late reading had come first."""
+    drive = DRIVES["cart"]
+    recorder = next(r for r in drive.recorders if r.rate == 500)
+    plant = HIDDEN["lag"][0](drive, recorder)
+    logs = [log_of(drive, plant, recorder, 192105 + i) for i in range(2)]
+    model = first_model({"log": logs[0]}, "cart", CATALOGUE)
+    known = few("coulomb_viscous", "encoder_delay", "actuator_lag", "lugre")
+    found = identify.diagnose(model, *logs, catalogue=known).axes["q"]
+    assert [(s.change.name, s.with_others) for s in found.steps] == [
+        ("encoder_delay", True), ("lugre", True),
+    ]  # fmt: skip
+    assert found.named == ("actuator_lag", "lugre")
+    assert found.findings[0].parameters["tau"] == pytest.approx(plant.lag, rel=0.06)
