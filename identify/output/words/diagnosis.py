@@ -146,8 +146,10 @@ def step_lines(found: AxisDiagnosis) -> list[str]:
         dropped = f"; no longer needed: {', '.join(step.dropped)}" if step.dropped else ""
         why = not_named_in_words(found, i)
         before, after = change(gain.before, gain.after, unit)
+        # It is told at the channel delay of the answer, where a law that imitated one may be worse.
+        how = "falls" if gain.after <= gain.before else "rises at the channel delay found later"
         lines.append(
-            f"step {i + 1}: with {what} the {tested_on(found)} falls from {before} to "
+            f"step {i + 1}: with {what} the {tested_on(found)} {how} from {before} to "
             f"{after}{dropped}{f'; not named: {why}' if why else ''}"
         )
     return lines
