@@ -7,41 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from built_fits import (
-    PERIOD,
-    PLAIN,
-    axis_of,
-    built_dataset,
-    built_machine,
-    built_motion,
-    fitted,
-    pushed,
-)
 from constructed import effect, fit_of, held, log_of, moved, waves, windowed
-from machines import CATALOGUE
-from scipy.optimize import least_squares
 
 from identify.dataset.blocks import Blocks
-from identify.dataset.dataset import Dataset
 from identify.dataset.motion import motion_of
-from identify.dataset.prepared_log import PreparedLog, moving
+from identify.dataset.prepared_log import moving
 from identify.estimation.errors import error_on
 from identify.estimation.fit import Fit, Outcome, at_bounds, finished, fit_axis, rms
 from identify.estimation.force_balance import jacobian, residual
 from identify.estimation.least_squares import minimise, orthonormal, unabsorbed
 from identify.estimation.scaling import Scaling
-from identify.estimation.variable_projection import (
-    fit_multistart,
-    fit_without,
-    starts,
-    tried_shapes,
-    with_what_repeats,
-)
 from identify.rules import RULE
-from twin.effect import Excitation
-from twin.excitation import Repeating
 from twin.model.machine import AxisModel, Fitted
-from twin.model.parameters import ParameterReference, free_parameters, read
+from twin.model.parameters import free_parameters, read
 
 ODD = AxisModel(
     1.7,
@@ -203,113 +181,7 @@ def test_no_number_is_no_convergence():
         )  # fmt: skip
         assert not found.converged
 
-
-# Laws of the solver, the scaling and subspaces: SciPy's solutions, a bijection, a projection
-
-
-WIDE = np.full(3, -1e9), np.full(3, 1e9)
-TIGHT = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_curved_problems_within_bounds_are_solved_as_scipy_solves_them(seed):
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0.1, 2.0, 50)
-    true = np.array([2.0, 1.3, 0.4]) * rng.uniform(0.8, 1.2, 3)
-    noise = rng.normal(0.0, 0.01, 50)
-
-    def curve(x):
-        return x[0] * np.exp(-x[1] * t) + x[2] * t**2
-
-    def left(x):
-        return curve(x) - curve(true) - noise
-
-    def slope(x):
-        e = np.exp(-x[1] * t)
-        return np.stack([e, -x[0] * t * e, t**2], axis=1)
-
-    for high in (9.0, 0.8 * true[1]):  # free, and with the rate at its bound
-        bounds = np.zeros(3), np.array([9.0, high, 9.0])
-        start = np.array([1.0, 0.5 * high, 1.0])
-        found = minimise(left, slope, start, bounds, tolerance=1e-14, most_evaluations=200)
-        wanted = least_squares(left, start, slope, bounds, **TIGHT)
-        assert found.converged
-        np.testing.assert_allclose(found.x, wanted.x, rtol=2e-4)
-        assert found.x[1] <= high
-
-
-def test_a_search_leaves_a_jacobian_as_it_is_and_needs_the_last_one_alone():
-    t, held, given = np.linspace(0.1, 2.0, 50), np.empty((50, 2)), []
-
-    def left(x):
-        return x[0] * np.exp(-x[1] * t) - 2.0 * np.exp(-1.3 * t)
-
-    def slope(x):
-        return np.stack([np.exp(-x[1] * t), -x[0] * t * np.exp(-x[1] * t)], axis=1)
-
-    def in_one_place(x):
-        if given:
-            np.testing.assert_array_equal(held, given[-1])
-        held[:] = slope(x)
-        given.append(held.copy())
-        return held
-
-    found, wanted = (
-        minimise(left, one, np.array([1.0, 0.5]), (np.zeros(2), np.full(2, 9.0)), tolerance=1e-14)
-        for one in (in_one_place, slope)
-    )
-    assert len(given) > 1
-    np.testing.assert_array_equal(found.x, wanted.x)
-
-
-def test_a_solver_stops_where_it_was_told_and_says_so():
-    def cost(x):
-        return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0], x[2]])
-
-    def slope(x):
-        return np.array([[-20.0 * x[0], 10.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-    calls = []
-
-    def counted(x):
-        calls.append(x)
-        return cost(x)
-
-    start = np.array([-1.2, 1.0, 2.0])
-    short = minimise(counted, slope, start, WIDE, tolerance=1e-12, most_evaluations=3)
-    assert not short.converged
-    assert len(calls) == 1 + 3
-    assert np.sum(cost(short.x) ** 2) < np.sum(cost(start) ** 2)
-    loose, full = (
-        minimise(cost, slope, start, WIDE, tolerance=t, most_evaluations=300) for t in (0.9, 1e-12)
-    )
-    assert loose.converged
-    assert np.sum(cost(loose.x) ** 2) > 1e-3
-    np.testing.assert_allclose(full.x, [1.0, 1.0, 0.0], atol=1e-5)
-
-
-def test_a_variable_that_does_nothing_and_one_pushed_outwards_stay():
-    a = 1e-4 * np.array([[1.0, 0.0, 2.0], [2.0, 0.0, -1.0], [1.5, 0.0, 0.3], [0.2, 0.0, 1.0]])
-    b = a @ [3.0, 0.0, -4.0]
-    bounds = np.array([-9.0, -9.0, -1.0]), np.array([1.0, 9.0, 9.0])
-
-    def solved(sign, start):
-        return minimise(
-            lambda x: a @ x + sign * b, lambda x: a, np.array(start), bounds,
-            tolerance=1e-14, most_evaluations=99,
-        )  # fmt: skip
-
-    for start in ([1.0, 0.7, -1.0], [0.3, 0.7, 5.0], [-99.0, 0.7, 99.0]):
-        found = solved(-1.0, start)
-        np.testing.assert_allclose(found.x, [1.0, 0.7, -1.0])
-        assert found.converged
-    np.testing.assert_allclose(solved(1.0, [1.0, 0.7, -1.0]).x, [-3.0, 0.7, 4.0], rtol=1e-5)
-    flat = minimise(
-        lambda x: np.ones(4), lambda x: 0.0 * a, np.zeros(3), bounds,
-        tolerance=1e-9, most_evaluations=5,
-    )  # fmt: skip
-    assert flat.converged
-    np.testing.assert_array_equal(flat.x, np.zeros(3))
+    # Laws of the scaling and of subspaces: a bijection, a projection
 
 
 def test_inside_and_outside_undo_each_other():
@@ -383,158 +255,3 @@ def test_what_columns_take_over_is_their_span_whatever_their_scale():
     np.testing.assert_allclose(unabsorbed(force[:, 0], basis), wanted[:, 0], atol=1e-9)
     assert orthonormal(np.zeros((30, 0))).shape == (30, 0)
     np.testing.assert_array_equal(unabsorbed(force, np.zeros((30, 0))), force)
-
-
-# What the tests of a search start from
-
-
-@pytest.fixture(scope="module")
-def dataset():
-    return built_dataset("one", "two")
-
-
-@pytest.fixture(scope="module")
-def base(dataset):
-    """The axis off its best values, with the residual and Jacobian that it has there."""
-    off = replace(axis_of(fitted("constant_force", F0=0.2)), mass=5.6)
-    return finished(off, PLAIN, dataset.training, Outcome.CONVERGED)
-
-
-# The search of an effect's shape: which values are tried, and how many of them
-
-
-# The rules as they were decided.
-REFINED_STARTS, RESIDUAL_LINES, FEWEST_CYCLES = 2, 6, 2.5
-SEEN = Excitation(-0.05, 0.07, 0.4, 0.3, 3.0, 1e-3)
-
-
-def planted(effect: str, **values: float) -> Dataset:
-    """Two logs, longer than their heads, of an axis with one effect more; without values none."""
-    motions = [built_motion(name, 7.0, seed) for seed, name in enumerate(("one", "two"))]
-    if values:
-        motions = [pushed(m, fitted(effect, **values)) for m in motions]
-    return replace(built_dataset(), training=tuple(PreparedLog.of(m, 0.04) for m in motions))
-
-
-@pytest.mark.parametrize(
-    ("effect", "values"),
-    [
-        ("periodic_disturbance", {"f": 11.0, "a": 0.1, "b": 0.05}),
-        ("cogging", {"p": 0.0213, "a1": 0.1, "b2": 0.05}),
-        ("end_stop", {"low": -0.0465, "high": 0.048, "stiffness": 500.0}),
-    ],
-)
-def test_the_first_start_has_the_scanned_values_nearest_to_the_planted_ones(effect, values):
-    dataset, effect = planted(effect, **values), CATALOGUE[effect]
-    base = fit_axis(PLAIN, dataset.training)
-    shapes = list(tried_shapes(effect, with_what_repeats(base, dataset)))
-    found = starts(base, dataset, effect)
-    assert len(found) == min(REFINED_STARTS, len(shapes))
-    for name, value in found[0].shape.items():
-        assert value == min((s[name] for s in shapes), key=lambda v: abs(v - values[name]))
-    assert [s.squared_error for s in found] == sorted(s.squared_error for s in found)
-    assert found[0].share(base) > 0.9
-
-
-def test_where_nothing_gains_more_than_chance_one_start_is_enough():
-    dataset = planted("end_stop")
-    found = starts(fit_axis(PLAIN, dataset.training), dataset, CATALOGUE["end_stop"])
-    assert len(found) == 1
-
-
-def test_a_wave_longer_than_the_logs_can_show_is_no_start():
-    dataset = planted("cogging", p=0.035, a1=0.3)  # m; the travel is 0.1 m
-    base = fit_axis(PLAIN, dataset.training)
-    position = np.concatenate([log.motion.position for log in dataset.training])
-    longest = np.ptp(position) / FEWEST_CYCLES
-    seen = with_what_repeats(base, dataset)
-    assert any(s["p"] > 2.0 * longest for s in tried_shapes(CATALOGUE["cogging"], seen))
-    assert all(s.shape["p"] <= longest for s in starts(base, dataset, CATALOGUE["cogging"]))
-
-
-def test_a_tone_in_the_residual_is_among_the_first_lines_tried(dataset):
-    base = finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED)
-    tone = np.concatenate([np.sin(2.0 * np.pi * 7.3 * w.time) for w in dataset.training])
-    loud = replace(base, residual=tone[base.kept])
-    known = replace(dataset, covered=lambda: replace(SEEN, repeats=Repeating((3.21, 4.56))))
-    found = with_what_repeats(loud, known)
-    assert found.lines[-2:] == (3.21, 4.56)
-    assert abs(found.lines[0] - 7.3) < 0.5
-    assert len(found.lines) <= RESIDUAL_LINES + 2
-    assert replace(found, repeats=known.excitation.repeats) == known.excitation
-    assert (found.pitches, found.thrust_pitches) == (loud.pitches, loud.thrust_pitches)
-
-
-@pytest.mark.parametrize("name", ["axis_coupling", "cogging", "coulomb_viscous"])
-def test_a_start_leaves_what_joint_least_squares_leave(dataset, base, name):
-    """Of its strengths and the parameters of the base, without the friction that it replaces."""
-    found = starts(base, dataset, CATALOGUE[name])[0]
-    where = [ParameterReference(name, p) for p in found.fitted.effect.strengths]
-    axis = base.axis.with_effect(found.fitted)
-    stays = [not c.effect or c.effect in axis.without(name).names for c in base.scaling.where]
-    own = jacobian(axis, dataset.training, where)[base.kept]
-    both = np.hstack([own, base.jacobian[:, stays]])
-    both = both / np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-    force = residual(axis, dataset.training)[base.kept]
-    left = force - both @ np.linalg.lstsq(both, force, rcond=1e-9)[0]
-    assert found.squared_error == pytest.approx(float(left @ left), rel=1e-3)
-    np.testing.assert_allclose(found.force, force, atol=1e-6 * np.abs(force).max())
-
-
-def test_a_strength_stops_at_its_bound():
-    log = PreparedLog.of(pushed(built_motion("one", 3.0, 1), fitted("quadratic_drag", c=5.0)), 0.04)
-    log = replace(log, command=log.command - 2.0 * residual(PLAIN, [log]))
-    dataset = replace(built_dataset(), training=(log,))
-    (found,) = starts(finished(PLAIN, PLAIN, dataset.training, Outcome.CONVERGED), dataset,
-                      CATALOGUE["quadratic_drag"])  # fmt: skip
-    assert found.fitted.values["c"] == 0.0
-
-
-def test_without_an_effect_the_rest_stays_where_it_was(dataset, base):
-    found = fit_without(base, dataset, "constant_force")
-    assert found.axis == base.axis.without("constant_force")
-    assert (found.begun, found.outcome) == (base.begun, base.outcome)
-    np.testing.assert_allclose(
-        found.residual, residual(base.axis, dataset.training)[found.kept] - 0.2, atol=1e-9
-    )
-
-
-def test_a_stop_that_only_a_late_move_reaches_is_the_first_start():
-    """The heads, on which no strength of it makes a force, tell nothing of it."""
-    plain = built_motion("late", 10.0)
-    time = PERIOD * np.arange(len(plain.position))
-    turn = 2.0 * np.pi * np.clip(time - 8.5, 0.0, 1.5) / 1.5
-    x = plain.position + 0.04 * np.sin(turn) * (1.0 - np.cos(turn))
-    v = np.gradient(x, PERIOD)
-    u = plain.command + 5.3 * np.gradient(v - plain.velocity, PERIOD)
-    motion = replace(plain, track=Blocks(np.stack([x, v, u]), np.stack([v, u])))
-    low, high = (x.min() + 0.05 * np.ptp(x), x.max() - 0.05 * np.ptp(x))
-    stopped = pushed(motion, fitted("end_stop", low=low, high=high, stiffness=2000.0))
-    covered = replace(SEEN, position_low=float(x.min()), position_high=float(x.max()))
-    dataset = replace(
-        built_dataset(), training=(PreparedLog.of(stopped, 0.04),), covered=lambda: covered
-    )
-    (head,) = dataset.heads
-    found = starts(fit_axis(PLAIN, dataset.training), dataset, CATALOGUE["end_stop"])
-    first = found[0].shape
-    assert first["low"] < head.motion.position.min()
-    assert first["high"] > head.motion.position.max()
-    assert not found[0].is_silent
-    assert (first["low"], first["high"]) == pytest.approx((low, high), abs=0.03 * np.ptp(x))
-
-
-def test_a_shape_is_sought_anew_where_error_is_left_and_nowhere_else():
-    """From a wrong pitch a fit ends beside the right one; what is held stays held."""
-    right = fitted("cogging", p=0.02, a1=0.4, b1=0.1)
-    right = replace(right, fixed=right.fixed | {"b1"})
-    dataset = built_machine(built_dataset("one", "two"), axis_of(right))
-    begun = axis_of(replace(right, values={**right.values, "p": 0.031, "a1": 0.01}))
-    stuck, found = fit_axis(begun, dataset.training), fit_multistart(begun, dataset)
-    assert found.error < 0.1 * stuck.error
-    values = found.axis["cogging"].values
-    assert (values["p"], values["a1"]) == pytest.approx((0.02, 0.4), rel=0.01)
-    assert (values["b1"], found.axis["cogging"].fixed) == (0.1, right.fixed)
-    assert found.begun is begun
-    quiet = fit_multistart(found.axis, dataset, begun=begun)
-    assert quiet.error == pytest.approx(found.error, rel=1e-3)
-    assert quiet.begun is begun
