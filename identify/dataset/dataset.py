@@ -42,7 +42,8 @@ class Dataset:
     by name, as the axis did not yet move freely. looks: how many lengths of the test functions were
     looked at, of which one may show by chance what the others do not. odd: a log that disagrees
     with the others; a diagnosis is made without it. asked: s, the length that their test functions
-    were made for, each as near to it as its blocks allow; None: that of the first.
+    were made for, each as near to it as its blocks allow; None: that of the first. beside_bodies:
+    whether it was asked of all joints of a mechanism at once what must move beside their bodies.
     """
 
     axis: str
@@ -56,6 +57,7 @@ class Dataset:
     looks: int = 1
     odd: Disagreement | None = None
     asked: float | None = None
+    beside_bodies: bool = False
 
     @property
     def beyond(self) -> dict[str, float]:

@@ -24,7 +24,7 @@ from identify.mechanism.regression import Regression, Solution, regression_of
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
-from identify.selection.of_bodies import What
+from identify.selection.what import What
 from twin.effects import Catalogue
 from twin.model.machine import MachineModel
 from twin.parallel import Progress, silent
@@ -141,7 +141,8 @@ def departures_of(
         body.forget()
     moved = Choice(regression).moved()
     names = {what: what.named(catalogue) for what in What}
-    found = replace(nothing, moved=moved, asked=True, names=names, groups=regression.groups)
+    beside = {axis: replace(own, beside_bodies=True) for axis, own in datasets.items()}
+    found = Departures(beside, fits, moved, (), True, names, regression.groups)
     return _with_bodies(found, regression)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from identify.dataset.body import INERTIAL, Body
 from identify.dataset.prepared_log import PreparedLog, Reach
-from identify.selection.of_bodies import What
+from identify.selection.what import What
 from twin.model.machine import AxisModel
 from twin.signals import Array
 

@@ -26,7 +26,7 @@ from identify.mechanism.bodies import possible
 from identify.mechanism.groups import Group
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, taken
-from identify.selection.of_bodies import What
+from identify.selection.what import What
 from twin.signals import Array
 
 

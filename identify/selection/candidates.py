@@ -29,6 +29,7 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
+from identify.selection.what import What
 from twin.curve import Coordinate
 from twin.effect import Effect, Excitation, Kind
 from twin.knee import Imitated, Imitation
@@ -175,7 +176,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
                 "the motion repeats with it, so that any force of the motion could be it"
             )
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
-        if own_force and _is_of_the_file(alone, dataset):
+        proved = dataset.beside_bodies and What.CURVE.covers(effect)
+        if own_force and not proved and _is_of_the_file(alone, dataset):
             return NotItself(
                 "a tenth more or less of what the bodies of the file weigh could be it"
             )

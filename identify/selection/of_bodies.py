@@ -7,11 +7,10 @@ known of the joints by then. What a joint lacks is judged beside them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import Enum
 
 import numpy as np
 
-from identify.dataset.body import ACCURACY, LINK_MASS, Body
+from identify.dataset.body import ACCURACY, Body
 from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.errors import error_on
@@ -20,47 +19,9 @@ from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import RIDGE, orthonormal, unabsorbed
 from identify.selection.acceptance import Judged
 from identify.selection.search import NEARLY
+from identify.selection.what import What
 from twin.effect import Effect, Kind
-from twin.effects import Catalogue
 from twin.signals import Array
-
-
-class What(Enum):
-    """What of a mechanism is asked of all joints at once, beside the bodies, in words."""
-
-    BODY = LINK_MASS
-    ROTOR = "rotor"
-    GAIN = "motor constant"
-    LOAD = "friction by load"
-    CURVE = "torque by place"
-
-    def covers(self, effect: Effect) -> bool:
-        """Whether an effect of one joint is a law of that.
-
-        A motor that saturates below most of its torque, or has a deadband, is nearly another
-        constant.
-        """
-        if effect.is_nonparametric or effect.states:
-            return False
-        if self is What.ROTOR:
-            return effect.added_mass is not None
-        if self is What.GAIN:
-            return effect.kind is Kind.ACTUATION and not _reads_any(effect, "X", "V", "TIME")
-        if self is What.LOAD:
-            return effect.kind is Kind.MODIFIER and effect.reads("LOAD")
-        repeats = any(p.period for p in effect.parameters)
-        of_place = effect.reads("X") and not _reads_any(effect, "V", "TIME") and not repeats
-        return self is What.CURVE and effect.kind is Kind.FORCE and of_place
-
-    def named(self, catalogue: Catalogue) -> str:
-        """The law by which it is told first: that of joints, or that of the fewest parameters."""
-        own = [e for e in catalogue.values() if self.covers(e)]
-        first = sorted(own, key=lambda e: (not e.of_joints, len(e.parameters)))
-        return first[0].name if first else self.value
-
-
-def _reads_any(effect: Effect, *slots: str) -> bool:
-    return any(map(effect.reads, slots))
 
 
 def is_of_bodies(less: Judged, final: Judged, effect: Effect) -> bool:

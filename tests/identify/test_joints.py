@@ -38,8 +38,8 @@ from identify.output.text import text_of
 from identify.project.folder import Folder
 from identify.project.keeping import keep
 from identify.selection.diagnosis import diagnose_axis
-from identify.selection.of_bodies import What
 from identify.selection.trying import try_effect
+from identify.selection.what import What
 from identify.validation.free_run import errors_of_both
 from identify.workflow import compare, diagnose, fit, plan
 from twin.effects import Catalogue, load_catalogue

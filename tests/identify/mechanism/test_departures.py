@@ -10,11 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.arms import machine
 from benchmarks.second_simulator.arms import Changed, drawn, inertia, log_of
 from identify.analysis.first_model import first_model
 from identify.mechanism.bodies import possible
 from identify.mechanism.departures import departures_of
-from identify.selection.of_bodies import What
+from identify.selection.trying import try_effect
+from identify.selection.what import What
 from identify.workflow import diagnose, fit
 from twin.effects import Catalogue, load_catalogue
 
@@ -120,3 +122,18 @@ def test_a_body_is_told_beside_the_friction_that_was_found_after_it():
     assert abs(first.change[0] - 0.8) > first.band[0]
     assert last.change[0] == pytest.approx(0.8, abs=last.band[0])
     assert abs(last.change[0] - 0.8) < 0.6 * abs(first.change[0] - 0.8)
+
+
+@pytest.mark.slow
+def test_a_spring_that_turns_as_the_weight_does_is_no_doubt_beside_all_bodies():
+    """One joint alone takes a tenth of its weight for it; all joints at once do not."""
+    own = machine(98, 21)
+    logs = [{f"{i}": log_of(own.arm, own.changed, 21000 + i)} for i in range(2)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", own.arm.text))
+    fitted = fit(model, *logs)
+    found = departures_of(fitted.model, fitted.fits, fitted.datasets, FEW)
+    ((_, joint),) = named(found)
+    known, spring = found.datasets[joint], CATALOGUE["spring"]
+    assert try_effect(found.fits[joint], known, spring).doubt is None
+    alone = replace(known, beside_bodies=False)
+    assert "weigh" in try_effect(found.fits[joint], alone, spring).doubt.why
