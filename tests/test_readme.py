@@ -71,6 +71,7 @@ def test_the_loop_runs_as_printed_and_the_error_falls(tmp_path):
     assert_the_error_falls(lambda command: run(command, tmp_path), tmp_path)
 
 
+@pytest.mark.slow
 def test_the_loop_runs_in_small_and_the_error_falls(tmp_path):
     """The printed commands on short logs, with two effects to choose from and blank pictures."""
     rivals = ("cogging", "force_constant_ripple")

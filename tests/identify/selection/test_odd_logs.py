@@ -148,6 +148,7 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
 
 
+@pytest.mark.slow
 def test_a_late_test_log_contradicts_nothing_and_is_told() -> None:
     """Late by a quarter of a pitch at speed, of the cogging that it would refute."""
     logs = runs(having(SLIDE, "cogging", p=0.02, a1=0.8))

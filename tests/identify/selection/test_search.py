@@ -103,6 +103,7 @@ def test_two_that_distort_each_other_are_found_together() -> None:
     assert found.final.at_floor
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
     reason="a free curve of the friction (part 1.00, t 25, control 0.21) is accepted before two "

@@ -28,6 +28,7 @@ def test_the_simpler_of_two_leads_unless_it_was_doubted() -> None:
     assert [s.change.name for s in with_ties(doubted).steps] == ["lugre"]
 
 
+@pytest.mark.slow
 def test_another_shape_goes_with_the_friction_that_it_was_of() -> None:
     """A friction that takes the place of a force takes that of the friction beside it as well."""
     machine = having(
