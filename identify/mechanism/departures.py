@@ -14,6 +14,7 @@ import numpy as np
 
 from identify.dataset.body import ACCURACY, Body
 from identify.dataset.dataset import Dataset
+from identify.estimation.alignment import fit_aligned
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths_by
@@ -171,7 +172,10 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
         assert m.group.body is not None
         change = told.changes[m.group.place]
         datasets = {a: m.group.body.corrected(d, change) for a, d in datasets.items()}
-    fits = {a: _refitted(found.fits[a], d) for a, d in datasets.items()}
+    # A wrong body hides by how much the channels of a log are apart.
+    again = {a: fit_aligned(found.fits[a].axis, d) for a, d in datasets.items()}
+    datasets = {a: dataset for a, (dataset, _) in again.items()}
+    fits = {a: replace(fit, begun=found.fits[a].begun) for a, (_, fit) in again.items()}
     errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
     bodies = tuple(_told_of(found, m, told, errors) for m in own)
     return replace(found, datasets=datasets, fits=fits, bodies=bodies)

@@ -121,8 +121,9 @@ class Finding:
     of its law.
     shape: the curve that is assumed and the one found, where they differ. bend: what gives the law
     that curve, where it has such a parameter. noise: the error of the test logs, in ``unit``, above
-    which it is surely more than noise. left, left_fitted: over the noise floor, the error
-    that all findings together leave on the logs that chose, and on the training logs. doubt: why
+    which it is surely more than noise; none where the training logs err more with it too. left,
+    left_fitted: over the noise floor, the error that all findings together leave on the logs that
+    chose, and on the training logs. doubt: why
     its values cannot be its own, in words; None where they can. imitated: what its law is on this
     motion, where no more than that is proved.
     """
@@ -188,13 +189,13 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     found.final.tell()
     names = dict.fromkeys(s.change.name for s in found.steps)
     by_law = [[s for s in found.steps if s.change.name == name] for name in names]
-    out = [_finding(steps, found) for steps in by_law]
     dataset, final = found.dataset, found.final
+    noise = noise_beside(final.fit.axis, dataset.test).sure if dataset.test else 0.0
+    out = [_finding(steps, found, noise) for steps in by_law]
     least = error_in(dataset.chosen_on, final.fit, dataset)
     left = least / (final.other_floor if dataset.selection else final.fit.floor)
     ratio = final.fit.ratio
-    noise = noise_beside(final.fit.axis, dataset.test).sure if dataset.test else 0.0
-    return tuple(replace(f, noise=noise, left=left, left_fitted=ratio) for f in out)
+    return tuple(replace(f, left=left, left_fitted=ratio) for f in out)
 
 
 def without_law(name: str, found: Found) -> Found:
@@ -233,8 +234,8 @@ def _alike(axis: AxisModel, passed: Sequence[Step]) -> list[AxisModel]:
     return [a for a in known if laws(a) == laws(axis)]
 
 
-def _finding(steps: Sequence[Step], found: Found) -> Finding:
-    """The finding of the steps that are about one law."""
+def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
+    """The finding of the steps that are about one law; noise: N, of the test logs with all."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
     less.tell()  # not both fits at once, whose matrices are of whole logs
     trim_memory()
@@ -266,6 +267,7 @@ def _finding(steps: Sequence[Step], found: Found) -> Finding:
         parameter_units=axis.parameter_units(name),
         equation=axis[name].effect.equation,
         score=beside,
+        noise=noise if final.fit.error < less.fit.error else 0.0,
         kind=FindingKind.RESEMBLES if stands_in else kind,
         together=tuple(others) if any(s.with_others for s in steps) else (),
         doubt=doubted.why if doubted and not stands_in else None,
