@@ -310,6 +310,12 @@ class Effect:
         return along and bool(self.states) and not self.sticks
 
     @property
+    def is_of_place(self) -> bool:
+        """Whether its force is told by where the axis is, and by nothing else."""
+        moves = self.reads("V") or self.reads("TIME") or self.is_nonparametric or self.states
+        return self.kind is Kind.FORCE and self.reads("X") and not moves
+
+    @property
     def turn(self) -> tuple[int, int]:
         """When a law's turn is within a sample; effects of an equal one keep the model's order.
 

@@ -254,7 +254,7 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
     doubted = None if alone else _doubt(steps[0].change, less, final)
-    stands_in = doubted is not None and doubted.is_of_position and steps[0].of_position
+    imitated = _imitated(steps[0], doubted, found)
     kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
         effect=name,
@@ -268,14 +268,26 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
         equation=axis[name].effect.equation,
         score=beside,
         noise=noise if final.fit.error < less.fit.error else 0.0,
-        kind=FindingKind.RESEMBLES if stands_in else kind,
+        kind=FindingKind.RESEMBLES if imitated else kind,
         together=tuple(others) if any(s.with_others for s in steps) else (),
-        doubt=doubted.why if doubted and not stands_in else None,
-        imitated=doubted.imitated if doubted and stands_in else None,
+        doubt=doubted.why if doubted and not imitated else None,
+        imitated=imitated,
     )
     for step in steps:
         finding = _shaped(finding, step.change, less.fit, found)
     return finding
+
+
+def _imitated(step: Step, doubted: NotItself | None, found: Found) -> Imitated | None:
+    """What a law is told as where it is not known to be itself; None where that is.
+
+    A force of position stands for whatever the force of the place is: another one beside it is more
+    of the same.
+    """
+    if doubted:
+        return doubted.imitated if doubted.is_of_position and step.of_position else None
+    beside = any(s.of_position for s in found.steps) and isinstance(step.change, Added)
+    return Imitated.OF_POSITION if beside and step.change.effect.is_of_place else None
 
 
 def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:

@@ -29,19 +29,14 @@ class What(Enum):
         if self is What.ROTOR:
             return effect.added_mass is not None
         if self is What.GAIN:
-            return effect.kind is Kind.ACTUATION and not _reads_any(effect, "X", "V", "TIME")
+            return effect.kind is Kind.ACTUATION and not any(map(effect.reads, ("X", "V", "TIME")))
         if self is What.LOAD:
             return effect.kind is Kind.MODIFIER and effect.reads("LOAD")
         repeats = any(p.period for p in effect.parameters)
-        of_place = effect.reads("X") and not _reads_any(effect, "V", "TIME") and not repeats
-        return self is What.CURVE and effect.kind is Kind.FORCE and of_place
+        return self is What.CURVE and effect.is_of_place and not repeats
 
     def named(self, catalogue: Catalogue) -> str:
         """The law by which it is told first: that of joints, or that of the fewest parameters."""
         own = [e for e in catalogue.values() if self.covers(e)]
         first = sorted(own, key=lambda e: (not e.of_joints, len(e.parameters)))
         return first[0].name if first else self.value
-
-
-def _reads_any(effect: Effect, *slots: str) -> bool:
-    return any(map(effect.reads, slots))

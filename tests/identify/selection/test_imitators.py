@@ -64,6 +64,17 @@ def test_what_repeats_too_few_times_is_told_as_a_force_of_position(pitch, imitat
     assert finding_in_words(finding)[0].startswith(told if imitated else "cogging explains")
 
 
+def test_beside_a_force_of_position_another_is_more_of_it():
+    """The second was named as a cogging with 99 %, or as a spring."""
+    known = few("cogging", "spring", "quadratic_drag")
+    true = having(having(SLIDE, "cogging", p=0.055, a1=0.4), "quadratic_drag", c=3.0)
+    found = asked(SLIDE, true, known, lambda x, v: 0.2 * np.sin(2 * np.pi * x / 0.04 + 1.0), SHORT)
+    told = {f.effect: f.kind for f in found.findings}
+    assert told.pop("quadratic_drag") is FindingKind.MISSING
+    assert len(told) == 2
+    assert set(told.values()) == {FindingKind.RESEMBLES}
+
+
 @pytest.mark.slow
 def test_what_a_free_curve_misses_between_its_knots_is_no_cogging():
     """A spring of another shape, and with 99 % two coggings of 4 mN, three knots a period."""
