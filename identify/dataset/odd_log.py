@@ -57,6 +57,11 @@ class Disagreement:
         return self.error / self.others
 
     @property
+    def is_of_recording(self) -> bool:
+        """Whether its own value is one of the recording, and no parameter of a model."""
+        return self.otherwise is not None and isinstance(self.otherwise.what, Recorded)
+
+    @property
     def is_sure(self) -> bool:
         """Whether it is told before the model has all that it lacks, which may look like it.
 
