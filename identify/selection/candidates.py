@@ -177,7 +177,8 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
             )
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
         proved = dataset.beside_bodies and What.CURVE.covers(effect)
-        if own_force and not proved and _is_of_the_file(alone, dataset):
+        of_weight = own_force and not proved and _is_of_the_file(alone, dataset)
+        if of_weight or (_scales_by_place(effect) and _is_within_the_file(alone, dataset)):
             return NotItself(
                 "a tenth more or less of what the bodies of the file weigh could be it"
             )
@@ -240,15 +241,31 @@ def _is_between_knots(law: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
 
 def _is_of_the_file(alone: AxisModel, dataset: Dataset) -> bool:
     """Whether most of a joint's force is what its bodies take, times less than their accuracy."""
-    if any(log.motion.bodies is None for log in dataset.training):
-        return False
-    force = averaged_force(alone, dataset.training)
-    rows = (log.test_function.mean(log.motion.joint_signals) for log in dataset.training)
-    _, _, _, load, *_ = np.hstack([*rows])
+    force, load = averaged_force(alone, dataset.training), _load(dataset)
     if not load.any():
         return False
     part = float(load @ force) / float(load @ load)
     return abs(part) < ACCURACY and _is_of(force, load[:, None])
+
+
+def _is_within_the_file(alone: AxisModel, dataset: Dataset) -> bool:
+    """Whether a joint's force is less than what bodies may be off, which changes with the pose."""
+    return rms(averaged_force(alone, dataset.training)) < ACCURACY * rms(_load(dataset))
+
+
+def _scales_by_place(effect: Effect) -> bool:
+    """Whether a motor's force follows the place for an effect, and not at once again."""
+    repeats = any(p.period for p in effect.parameters)
+    return effect.kind is Kind.ACTUATION and effect.reads("X") and not repeats
+
+
+def _load(dataset: Dataset) -> Array:
+    """What the bodies of a mechanism take of a joint (n,) N; zero of a plain axis."""
+    if any(log.motion.bodies is None for log in dataset.training):
+        return np.zeros(1)
+    rows = (log.test_function.mean(log.motion.joint_signals) for log in dataset.training)
+    _, _, _, load, *_ = np.hstack([*rows])
+    return np.asarray(load)
 
 
 def _is_the_friction(alone: AxisModel, before: Judged, fit: Fit) -> bool:

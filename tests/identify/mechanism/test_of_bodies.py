@@ -36,6 +36,8 @@ def test_a_law_is_judged_beside_the_bodies(planted, law, of_bodies):
     logs = [{str(seed): arm_log(seed, **planted)} for seed in (1, 2)]
     made = fit(first_model(logs[0], "arm", CATALOGUE, ("arm.xml", ARM)), *logs)
     base, dataset = made.fits["shoulder"], made.datasets["shoulder"]
-    tried = effect_tried(base, dataset, CATALOGUE[law]).judged
+    found = effect_tried(base, dataset, CATALOGUE[law])
+    tried, doubt = found.judged, found.candidate.doubt
     assert tried.fit.error < 0.9 * base.error
     assert is_of_bodies(Judged(base, dataset), tried, CATALOGUE[law]) == of_bodies
+    assert bool(doubt and "weigh" in doubt.why) == of_bodies
