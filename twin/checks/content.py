@@ -169,7 +169,8 @@ def _aliased(axis: Axis, rounded: bool) -> Iterator[LogFinding]:
     Rounding is a tone of speed over step, Hz, folded at the sample rate: there it is as slow as the
     motion, in the reading and in what a controller makes of it. rounded: whether the steps show.
     """
-    slow, most = 10.0, 0.5  # Hz, what test functions pass; of the motion, to be worth a word
+    slow = 10.0  # Hz, what test functions pass
+    most = 0.25 + 2.0 * slow / axis.sample_rate  # of the motion: a quarter more than by chance
     few = 20.0  # steps a sample; of more, rounding is a small part of what a sample moves
     if not rounded:
         return
