@@ -205,8 +205,8 @@ def _against(
     if gain is not None:
         usual, scatter = _among(best, others, theirs)
         own_value = _otherwise(best, gain - usual, own, axis, where)
-        # What a model lacks looks like some delay or gain of a log whose force hardly changes.
-        if own_value and isinstance(own_value.what, Recorded) and rms(left) < most:
+        # What a model lacks looks like some delay, gain or mass of a log that hardly tells them.
+        if rms(left) < most:
             own_value = None
         change = abs(_gains(own, left, near)[0][best] - usual) if near.any() else 0.0
         far = change > more * CLEAR * scatter
