@@ -37,8 +37,9 @@ def without_odd_log(
             break
     else:
         ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
-    if odd and _is_unexplained(ended) and odd.is_of_recording and not odd.is_sure:
-        return conclude(base, dataset), None  # what all lack looks like some delay or gain of one
+    if odd and odd.is_of_recording and not odd.is_sure and _is_unexplained(ended):
+        # What all of them lack looks like some delay or gain of one.
+        return (conclude(base, dataset) if _spoiling(odd, dataset) else ended), None
     if _spoiling(odd, dataset) is None and _is_unexplained(ended):
         return _without_suspect(base, dataset, conclude) or (ended, odd)
     return ended, odd
