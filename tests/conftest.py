@@ -30,7 +30,7 @@ LONGEST = (
     "test_import_guess",
     "test_departures",
     "test_tables",
-    "test_one_dataset",
+    "test_left_out",
     "test_recording",
     "test_points",
     "test_imitators",

@@ -44,6 +44,13 @@ def settle(
 
 
 @compiled(inline=True)
+def _copy(states, to):
+    """Put states (n,) into others, where an assignment of slices takes seconds to compile."""
+    for i in range(states.shape[0]):
+        to[i] = states[i]
+
+
+@compiled(inline=True)
 def _left(
     entries, first, last, parameters, states, at, motion, others, pushed, k, velocity, dt,
     time_origin, io, row,
@@ -64,7 +71,7 @@ def _settle(
     gone = 0.0
     for k in range(path.shape[0]):
         gone = kept * gone if free[k] else 0.0
-        before[:] = now
+        _copy(now, before)
         left = _left(
             entries, first, last, parameters, now, at, motion, others, pushed, k, path[k], dt,
             time_origin, io, row,
@@ -76,7 +83,7 @@ def _settle(
         far = (room if left > 0.0 else -room) - gone
         step, then = far, left
         for i in range(TRIES):
-            now[:] = before
+            _copy(before, now)
             then = _left(
                 entries, first, last, parameters, now, at, motion, others, pushed, k,
                 path[k] + step / dt, dt, time_origin, io, row,
@@ -93,7 +100,7 @@ def _settle(
             step = (near * far_left - far * near_left) / (far_left - near_left)
         if abs(then) >= abs(left):  # no law answers
             step = 0.0
-            now[:] = before
+            _copy(before, now)
             _left(
                 entries, first, last, parameters, now, at, motion, others, pushed, k, path[k], dt,
                 time_origin, io, row,
