@@ -310,6 +310,11 @@ class Effect:
         return along and bool(self.states) and not self.sticks
 
     @property
+    def repeats(self) -> bool:
+        """Whether its force repeats along the track."""
+        return any(p.period for p in self.parameters)
+
+    @property
     def is_of_place(self) -> bool:
         """Whether its force is told by where the axis is, and by nothing else."""
         moves = self.reads("V") or self.reads("TIME") or self.is_nonparametric or self.states

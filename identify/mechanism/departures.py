@@ -36,15 +36,14 @@ from twin.signals import Array
 class Departures:
     """What must move, and the joints beside the bodies as they were found.
 
-    asked: whether the joints are those of a mechanism, and more than noise is left of them. names:
-    of the laws by which groups are told. groups: all that were asked.
+    names: of the laws by which groups are told. groups: all that were asked; none of plain axes,
+    and where only noise is left of every joint.
     """
 
     datasets: Mapping[str, Dataset]
     fits: Mapping[str, Fit]
     moved: Sequence[Moved] = ()
     bodies: tuple[WrongBody, ...] = ()
-    asked: bool = False
     names: Mapping[What, str] = field(default_factory=dict)
     groups: Sequence[Group] = ()
 
@@ -54,7 +53,7 @@ class Departures:
         Friction that follows the load is a matter of one joint, and so is a rotor of which the file
         says nothing: what the model lacks otherwise on a joint may hide them here.
         """
-        if not self.asked:
+        if not self.datasets[axis].beside_bodies:
             return catalogue
         own = {m.group.what for m in self.moved if m.group.axis == axis} | {What.LOAD}
         own |= {What.ROTOR} if self.fits[axis].begun.weighed is self.fits[axis].begun else set()
@@ -143,7 +142,7 @@ def departures_of(
     moved = Choice(regression).moved()
     names = {what: what.named(catalogue) for what in What}
     beside = {axis: replace(own, beside_bodies=True) for axis, own in datasets.items()}
-    found = Departures(beside, fits, moved, (), True, names, regression.groups)
+    found = Departures(beside, fits, moved, names=names, groups=regression.groups)
     return _with_bodies(found, regression)
 
 

@@ -176,9 +176,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
                 "the motion repeats with it, so that any force of the motion could be it"
             )
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
-        proved = dataset.beside_bodies and What.CURVE.covers(effect)
-        of_weight = own_force and not proved and _is_of_the_file(alone, dataset)
-        if of_weight or (_scales_by_place(effect) and _is_within_the_file(alone, dataset)):
+        if _may_be_of_bodies(alone, dataset):
             return NotItself(
                 "a tenth more or less of what the bodies of the file weigh could be it"
             )
@@ -239,24 +237,24 @@ def _is_between_knots(law: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
     )
 
 
-def _is_of_the_file(alone: AxisModel, dataset: Dataset) -> bool:
-    """Whether most of a joint's force is what its bodies take, times less than their accuracy."""
-    force, load = averaged_force(alone, dataset.training), _load(dataset)
-    if not load.any():
+def _may_be_of_bodies(alone: AxisModel, dataset: Dataset) -> bool:
+    """Whether bodies within their accuracy could take what one effect of a joint does.
+
+    A force is theirs where it is the load times less than that. So is less of it than that where a
+    motor's force follows the place, as what bodies are off by does, and not at once again. A curve
+    that all joints were asked for beside their bodies is known.
+    """
+    (effect,) = (f.effect for f in alone.effects)
+    by_place = effect.kind is Kind.ACTUATION and effect.reads("X") and not effect.repeats
+    own_force = effect.kind is Kind.FORCE and not effect.of_joints
+    known = dataset.beside_bodies and What.CURVE.covers(effect)
+    if known or not (by_place or own_force) or not (load := _load(dataset)).any():
         return False
+    force = averaged_force(alone, dataset.training)
+    if by_place:
+        return rms(force) < ACCURACY * rms(load)
     part = float(load @ force) / float(load @ load)
     return abs(part) < ACCURACY and _is_of(force, load[:, None])
-
-
-def _is_within_the_file(alone: AxisModel, dataset: Dataset) -> bool:
-    """Whether a joint's force is less than what bodies may be off, which changes with the pose."""
-    return rms(averaged_force(alone, dataset.training)) < ACCURACY * rms(_load(dataset))
-
-
-def _scales_by_place(effect: Effect) -> bool:
-    """Whether a motor's force follows the place for an effect, and not at once again."""
-    repeats = any(p.period for p in effect.parameters)
-    return effect.kind is Kind.ACTUATION and effect.reads("X") and not repeats
 
 
 def _load(dataset: Dataset) -> Array:

@@ -194,8 +194,7 @@ def findings_of(found: Found) -> tuple[Finding, ...]:
     out = [_finding(steps, found, noise) for steps in by_law]
     least = error_in(dataset.chosen_on, final.fit, dataset)
     left = least / (final.other_floor if dataset.selection else final.fit.floor)
-    ratio = final.fit.ratio
-    return tuple(replace(f, left=left, left_fitted=ratio) for f in out)
+    return tuple(replace(f, left=left, left_fitted=final.fit.ratio) for f in out)
 
 
 def without_law(name: str, found: Found) -> Found:

@@ -32,8 +32,7 @@ class What(Enum):
             return effect.kind is Kind.ACTUATION and not any(map(effect.reads, ("X", "V", "TIME")))
         if self is What.LOAD:
             return effect.kind is Kind.MODIFIER and effect.reads("LOAD")
-        repeats = any(p.period for p in effect.parameters)
-        return self is What.CURVE and effect.is_of_place and not repeats
+        return self is What.CURVE and effect.is_of_place and not effect.repeats
 
     def named(self, catalogue: Catalogue) -> str:
         """The law by which it is told first: that of joints, or that of the fewest parameters."""

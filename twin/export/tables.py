@@ -141,7 +141,7 @@ def _repeats(fitted: Fitted) -> bool:
     """Whether its force is one of the phase of a pitch alone."""
     effect = fitted.effect
     alone = effect.kind is Kind.FORCE and not effect.states and not effect.reads("V")
-    return alone and any(p.period for p in effect.parameters)
+    return alone and effect.repeats
 
 
 def _pass(axis: AxisModel, positions: Array, velocity: float) -> Array:

@@ -129,7 +129,7 @@ def coordinate_of_answer(view: AxisView, known: Sequence[str]) -> str:
 
 def _of_effect(effect: Effect) -> str:
     """The coordinate that the force of an effect is a curve over; "" where it is none."""
-    if any(p.period for p in effect.parameters):
+    if effect.repeats:
         return f"{effect.name}_phase"
     if effect.reads("TIME"):
         return "time"
