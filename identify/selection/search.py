@@ -214,7 +214,9 @@ def _without_delay(judged: Judged, trial: Beside, progress: Progress) -> Judged:
         return judged
     dataset = realigned(judged.dataset, 0.0)
     plain = Judged(replace(fit_axis(fit.axis, dataset.training), begun=fit.begun), dataset)
-    tried = tried_beside(plain, trial, within(progress, "no channel delay"))[1]
+    takes = 1.0 - (fit.error / plain.fit.error) ** 2
+    instead = replace(trial, least=max(takes, trial.least))
+    tried = tried_beside(plain, instead, within(progress, "no channel delay"))[1]
     found = [t for t in tried if t.candidate.supported and not t.judged.dataset.channel_delay]
     return plain if any(score(judged, t.judged).accepted for t in found) else judged
 

@@ -59,12 +59,14 @@ class Beside:
     """What is tried beside a fit: a catalogue, and what of it is not.
 
     taken: names of laws that the search added; a free curve may stand in the place of one, which is
-    then not absent. barred: names of laws of which no change is tried.
+    then not absent. barred: names of laws of which no change is tried. least: part of what is left
+    that a change has to take.
     """
 
     catalogue: Catalogue
     taken: Sequence[str] = ()
     barred: Collection[str] = ()
+    least: float = RULE.least_part
 
 
 def tried_beside(
@@ -91,7 +93,8 @@ def tried_beside(
     ahead = Ahead(progress)
     screenings = spread(lambda c: ahead.screened(c.screen(judged, controls)), changes, trying)
     looks = judged.dataset.looks
-    tried = _refitted(judged, screenings, looks * len({e.kind for e in effects}), progress)
+    kinds = looks * len({e.kind for e in effects})
+    tried = _refitted(judged, screenings, kinds, progress, trial.least)
     for one in tried:
         ahead.note(one.change, one.candidate.part)
     enough = judged.at_floor or any(t.judged.at_floor and t.candidate.supported for t in tried)
@@ -100,7 +103,7 @@ def tried_beside(
         shapes = [c for c in reshaped_of(judged.fit, judged.dataset) if c.name not in barred]
         curves = [c.screen(judged, controls) for c in shapes]
         best = sorted(curves, key=lambda k: -k.promise)[:LEADERS]
-        tried += _refitted(judged, best, looks * len(curves), progress, tried)
+        tried += _refitted(judged, best, looks * len(curves), progress, trial.least, tried)
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
     trim_memory()
@@ -117,15 +120,16 @@ def _refitted(
     screenings: Sequence[Screening],
     among: int,
     progress: Progress,
+    least: float,
     known: Sequence[Tried] = (),
 ) -> list[Tried]:
     """The changes that promise enough, refitted; the better ones from all starts if none is enough.
 
-    among: of how many independent ones they are; effects of one kind are alike. known: what was
-    refitted before.
+    among: of how many independent ones they are; effects of one kind are alike. least: part of what
+    is left that each has to take. known: what was refitted before.
     """
     most = max((t.candidate.part for t in known), default=0.0)
-    asked = RULE.promise * max(RULE.least_part, most)
+    asked = RULE.promise * max(least, most)
     waiting = sorted((k for k in screenings if k.promise >= asked), key=lambda k: -k.promise)
     refitting = partial(progress, "refitting the promising")
     first = spread(lambda k: (k, _fit_of(judged, k)), waiting[:LEADERS], refitting)

@@ -108,17 +108,28 @@ def stands(entries, first, last, p, s, io):
     return answers(entries, first, last, p, s, io)[3] != 0.0
 
 
+def steps_of(entries, first, last, n_states, period):
+    """Steps in which structure effects walk along a block of ``period`` s.
+
+    Short enough for a contact; one where none of them has a state, as the mean of the block's
+    acceleration is then all that they ask for. n_states: of the whole table.
+    """
+    begin = np.append(entries[:, S_AT], n_states)
+    if begin[first] == begin[last]:
+        return 1
+    return int(np.ceil(period / LONGEST_STEP - 1e-9))
+
+
 @compiled()
-def along(entries, first, last, p, s, io, velocity, k, standing, rows):
+def along(entries, first, last, p, s, io, velocity, k, standing, steps, rows):
     """Force (N) of structure effects along block k of a measured motion; their states advance.
 
     velocity (n,) m/s: means of blocks of DT s. standing: as ``stands`` says of them. A block is
-    walked in steps short enough for a contact, with the acceleration a parabola that has the means
-    of the blocks around it. rows (2, n_entries): the first receives the block's mean, the second is
-    overwritten.
+    walked in so many steps, as ``steps_of`` says, with the acceleration a parabola that has the
+    means of the blocks around it. rows (2, n_entries): the first receives the block's mean, the
+    second is overwritten.
     """
     block, ended = io[DT], velocity.shape[0] - 1
-    steps = int(np.ceil(block / LONGEST_STEP - 1e-9))
     now = slope(velocity, k, block)
     before, after = slope(velocity, max(k - 1, 0), block), slope(velocity, min(k + 1, ended), block)
     rise, bend = 0.5 * (after - before), 0.5 * (after - 2.0 * now + before)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.compiled import ADDRESS, KIND, P_AT, S_AT, address_of, borrow, call_at, compiled
-from twin.core.native import along, axis_force, sense, stands
+from twin.core.native import along, axis_force, sense, stands, steps_of
 from twin.effect import (
     A_OTHER,
     COLUMNS,
@@ -68,9 +68,11 @@ def walk(
     that holds a measured axis at rest is not determined.
     rows (n_entries, n): N.
     """
+    structure = structure_of(entries, first, last)
     _walk(
-        entries, first, structure_of(entries, first, last), last, parameters, states, at, motion,
-        others, dt, begin, rows, time_origin, lent_io(dt, mass), np.zeros((2, len(entries))),
+        entries, first, structure, last, parameters, states, at, motion, others, dt, begin, rows,
+        time_origin, lent_io(dt, mass), steps_of(entries, structure, last, len(states), dt),
+        np.zeros((2, len(entries))),
     )  # fmt: skip
 
 
@@ -90,7 +92,8 @@ def walk_sets(
     follow = remembers[first:structure]
     _walk_sets(
         entries, laws, structure, last, sets, np.zeros((len(sets), states_needed)), motion, others,
-        dt, begin, totals, time_origin, lent_io(dt, mass), np.zeros((2, len(entries))), follow,
+        dt, begin, totals, time_origin, lent_io(dt, mass),
+        steps_of(entries, structure, last, states_needed, dt), np.zeros((2, len(entries))), follow,
         path,
     )  # fmt: skip
 
@@ -137,7 +140,7 @@ def arrive(io, motion, others, k, begin, dt, time_origin):
 @compiled(nogil=True)
 def _walk(
     entries, first, structure, last, parameters, states, at, motion, others, dt, begin, rows,
-    time_origin, io, row,
+    time_origin, io, steps, row,
 ):  # fmt: skip
     entries, parameters, states = borrow((entries, parameters, states))
     p, s = parameters.ctypes.data, states.ctypes.data
@@ -147,7 +150,7 @@ def _walk(
         lent = borrow(row)
         axis_force(entries, first, structure, parameters, states, at, borrow(io), lent, 0)
         if structure < last:
-            along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
+            along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, steps, lent)
         for i in range(first, last):
             rows[i, k] = row[0, i]
 
@@ -155,7 +158,7 @@ def _walk(
 @compiled(nogil=True)
 def _walk_sets(
     entries, laws, structure, last, sets, states, motion, others, dt, begin, totals, time_origin,
-    io, row, remembers, path,
+    io, steps, row, remembers, path,
 ):  # fmt: skip
     addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], laws[P_AT], laws[S_AT]
     w = io.ctypes.data
@@ -183,9 +186,9 @@ def _walk_sets(
                     friction = io[OUT]
             own[k] = total - friction + (io[U] - motion[2, k])
             if structure < last:
-                lent = borrow(row)
+                lent, own_io = borrow(row), borrow(io)
                 io[V] = motion[1, k]
-                along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, lent)
+                along(entries, structure, last, p, s, own_io, motion[1], k, standing, steps, lent)
                 for i in range(structure, last):
                     own[k] += row[0, i]
 
