@@ -121,7 +121,7 @@ class Dataset:
         if not self.selection:
             return None
         fit, held = (
-            tuple(replace(log, reach=EVERYWHERE) for log in logs)
+            tuple(w if w.reach == EVERYWHERE else replace(w, reach=EVERYWHERE) for w in logs)
             for logs in (self.selection, self.training)
         )
         return replace(self, training=fit, selection=held)

@@ -2,8 +2,8 @@
 
 A law is fitted to the training logs and judged by the selection logs. Which of two like logs does
 which is the user's choice, and no property of the machine. So it is asked once more with the roles
-exchanged: of each law that was found whether it is still proved, and of those that only the
-selection logs refused whether it is then.
+exchanged: of each law that was found whether it is still proved. What is proved only then, the
+search has noted at its end.
 """
 
 from __future__ import annotations
@@ -11,10 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from identify.dataset.dataset import Dataset
-from identify.rules import RULE
-from identify.selection.acceptance import Judged, Score, least_t, score
-from identify.selection.changes import control
+from identify.selection.acceptance import Judged, Score, score
 from identify.selection.findings import Finding
 from identify.selection.search import Found
 from identify.selection.trying import refitted_on
@@ -43,7 +40,7 @@ def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDepen
     if dataset is None or (found.final.at_floor and not findings):
         return ()
     final = refitted_on(found.final.fit.axis, Judged(found.final.fit, dataset))
-    return (*_lost(found, findings, final), *_gained(found, final, dataset))
+    return (*_lost(found, findings, final), *_gained(found))
 
 
 def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[RoleDependent]:
@@ -60,22 +57,12 @@ def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[
         yield RoleDependent(finding.effect, True, there.part, there.t)
 
 
-def _gained(found: Found, final: Judged, dataset: Dataset) -> Iterator[RoleDependent]:
-    """Of the laws that only the selection logs refused those that are proved then."""
-    for tried in found.last:
+def _gained(found: Found) -> Iterator[RoleDependent]:
+    """Of the laws that are proved with the roles exchanged those that are not as they are."""
+    for tried in found.exchanged:
         own = tried.candidate.score
-        if own is None or tried.candidate.doubt or not _by_selection_alone(own):
-            continue
-        after = refitted_on(tried.judged.fit.axis, Judged(tried.judged.fit, dataset))
-        there = score(final, after, among=own.among)
-        if there.accepted and there.part > control(tried.change, final, after):
+        if own is not None and not own.accepted:
             yield RoleDependent(tried.change.name, False, own.part, own.t)
-
-
-def _by_selection_alone(own: Score) -> bool:
-    """Whether the training logs would have had it."""
-    group = own.training
-    return not own.accepted and group.t >= least_t(1) and group.part >= RULE.least_part
 
 
 def _proved(there: Score) -> bool:

@@ -44,6 +44,7 @@ from identify.selection.trying import (
     refitted_on,
     settled,
     tried_beside,
+    tried_exchanged,
 )
 from twin.effect import Kind
 from twin.effects import Catalogue
@@ -85,8 +86,9 @@ class Found:
 
     base: the fit before, at its best. steps: the changes that were accepted and are needed still.
     passed: all that were accepted on the way. final: the fit with the steps. ranking: every absent
-    effect beside the base. last: the changes that were tried beside the final fit. barred: names of
-    laws that were doubted, of which no change is tried.
+    effect beside the base. last: the changes that were tried beside the final fit. exchanged: those
+    of them that training and selection logs prove with their roles exchanged. barred: names of laws
+    that were doubted, of which no change is tried.
     """
 
     dataset: Dataset
@@ -96,6 +98,7 @@ class Found:
     passed: tuple[Step, ...]
     ranking: tuple[Candidate, ...]
     last: tuple[Tried, ...]
+    exchanged: tuple[Tried, ...] = ()
     barred: frozenset[str] = frozenset()
 
 
@@ -127,7 +130,7 @@ def resumed(found: Found, catalogue: Catalogue, progress: Progress = silent) -> 
 
 def _fits_of(found: Found) -> list[Fit]:
     """All fits of a search, some of them several times."""
-    tried = [*found.last, *(t for s in found.passed for t in (s.tried, *s.tied))]
+    tried = [*found.last, *found.exchanged, *(t for s in found.passed for t in (s.tried, *s.tied))]
     fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
     return [*fits, *(c.fit for c in found.ranking)]
 
@@ -170,6 +173,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
     """Go on from what was found."""
     first, judged, steps = found.base, found.final, found.steps
     passed, ranking, last = [*found.passed], found.ranking, list(found.last)
+    exchanged = list(found.exchanged)
     been: set[frozenset[tuple[type, str]]] = set()
     while len(steps) < RULE.most_steps:
         made = frozenset((type(s.change), s.change.name) for s in steps)
@@ -183,9 +187,14 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         if not steps:
             doubted = (c for c in ranking if c.effect.name in found.barred)
             first, ranking = judged, ordered([*candidates, *doubted])
-        new = _accepted(judged, last) or _together(judged, last, trial, step) or _of_position(last)
+        new = _accepted(judged, last)
+        if not new:
+            exchanged = tried_exchanged(judged, trial, step)
+            new = _accepted(judged, exchanged) or _together(judged, last, trial, step)
+        new = new or _of_position([*last, *exchanged])
         if not new:
             break
+        exchanged = []
         passed += new
         _forget(t.judged.fit for t in last if all(t is not s.tried for s in new))
         step("all values refitted", 0, 1)
@@ -200,7 +209,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         dataset, fit = synchronised(fit, judged.dataset)
         judged = settled(Judged(fit, dataset))
     ended = (judged.dataset, first, judged, steps, tuple(passed), ranking, tuple(last))
-    found = Found(*ended, found.barred)
+    found = Found(*ended, tuple(exchanged), found.barred)
     return found if first.dataset is judged.dataset else on_final_dataset(judged, found)
 
 

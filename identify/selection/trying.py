@@ -37,7 +37,7 @@ from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.machine import AxisModel
-from twin.parallel import Progress, silent, spread
+from twin.parallel import Progress, silent, spread, within
 from twin.threads import trim_memory
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
@@ -113,6 +113,26 @@ def tried_beside(
     screened = [_as_screened(judged, k) for k in screenings if isinstance(k.change, Added)]
     candidates = [ranked.get(c.effect.name, c) for c in screened] + [n.candidate for n in noise]
     return judged, [*tried, *noise], candidates
+
+
+def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) -> list[Tried]:
+    """What is proved with training and selection logs exchanged, and comes near as they are.
+
+    Fitted again and judged with the roles as they are: what it takes is to be seen either way, but
+    a start that the one group of logs hides, the other may show.
+    """
+    dataset = judged.dataset.exchanged
+    if dataset is None or judged.at_floor:
+        return []
+    there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
+    tried = tried_beside(there, trial, within(progress, "training and selection logs exchanged"))[1]
+
+    def as_they_are(t: Tried) -> Tried:
+        score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
+        return judged_change(judged, t.screening, fit, score.among if score else 1)
+
+    found = (t for t in tried if t.candidate.supported or t.candidate.is_of_position)
+    return [as_they_are(t) for t in found if not t.candidate.is_noise]
 
 
 def _refitted(
