@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from planted_logs import SLIDE, Ride, begun, few, having, logged
+from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 
@@ -33,3 +34,26 @@ def test_of_a_law_that_both_logs_prove_nothing_of_the_kind_is_told() -> None:
     found = diagnosed(0.1, Ride(2))
     assert found.named == ("cogging",)
     assert not found.by_roles
+
+
+def test_a_law_that_a_touched_log_hides_is_told_to_depend_on_roles_whichever_log_chooses() -> None:
+    def touched(x: Array, v: Array) -> Array:
+        between = (np.arange(len(x)) > 2000) & (np.arange(len(x)) < 3500)
+        return 2.0 * np.exp(-(((x - 0.01) / 0.01) ** 2)) * (v > 0) * between
+
+    true = having(SLIDE, "cogging", p=0.021, a1=0.03, b1=0.0)
+    good, poor = {"good": logged(true, Ride(1))}, {"poor": logged(true, Ride(4), touched)}
+    for pair, named in (((good, poor), True), ((poor, good), False)):
+        (law,) = diagnose_axis(*begun(SLIDE, *pair), KNOWN).by_roles
+        assert (law.effect, law.named) == ("cogging", named)
+
+
+def test_what_one_log_does_not_propose_and_both_prove_is_named_whichever_log_chooses() -> None:
+    def sticky(x: Array, v: Array) -> Array:
+        return 0.4 * np.sign(v) * np.exp(-((v / 0.01) ** 2))
+
+    true = having(SLIDE, "cogging", p=0.021, a1=0.06, b1=0.0)
+    one = {"one": logged(true, Ride(3, 3.0), sticky)}
+    two = {"two": logged(true, Ride(13, 6.0), sticky)}
+    for pair in ((one, two), (two, one)):
+        assert diagnose_axis(*begun(SLIDE, *pair), KNOWN).named == ("cogging",)
