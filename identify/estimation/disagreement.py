@@ -59,6 +59,17 @@ class _Rows:
         """The columns (n, k + 3) of the model, then of the recording."""
         return np.column_stack([self.columns, self.recorded])
 
+    def predicted_by(self, others: Sequence[_Rows]) -> _Rows:
+        """Those that a fit of other logs predicts no worse than they were measured.
+
+        By their leverage; a part of a free curve where others have not been, nobody predicts.
+        """
+        gram = sum(r.columns.T @ r.columns for r in others) + RIDGE**2 * np.eye(self.columns.shape[1])
+        leverage = np.sum(self.columns * np.linalg.solve(gram, self.columns.T).T, axis=1)
+        which = leverage < 1.0
+        names = ("left", "columns", "recorded", "states", "time")
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
 
 def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
     """The log that disagrees with the others, by a model with its values; None where none does.
@@ -193,7 +204,10 @@ def _against(
     k: int, rows: Sequence[_Rows], axis: AxisModel, where: Sequence[ParameterReference]
 ) -> Disagreement | None:
     """How a log disagrees with the others; None where it does not."""
-    own, others = rows[k], [r for i, r in enumerate(rows) if i != k]
+    others = [r for i, r in enumerate(rows) if i != k]
+    own = rows[k].predicted_by(others)
+    if not len(own.left):
+        return None
     more = FEW if len(rows) == FEWEST else 1.0
     left, theirs = _predicted(own, others)
     most = max(map(rms, theirs))
