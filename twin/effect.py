@@ -315,6 +315,11 @@ class Effect:
         return any(p.period for p in self.parameters)
 
     @property
+    def delays(self) -> bool:
+        """Whether a force acts, or a motion is read, the later for it."""
+        return self.dead_time or (self.kind is Kind.ACTUATION and bool(self.states))
+
+    @property
     def is_of_place(self) -> bool:
         """Whether its force is told by where the axis is, and by nothing else."""
         moves = self.reads("V") or self.reads("TIME") or self.is_nonparametric or self.states

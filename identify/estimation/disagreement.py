@@ -64,7 +64,8 @@ class _Rows:
 
         By their leverage; a part of a free curve where others have not been, nobody predicts.
         """
-        gram = sum(r.columns.T @ r.columns for r in others) + RIDGE**2 * np.eye(self.columns.shape[1])
+        weak = RIDGE**2 * np.eye(self.columns.shape[1])
+        gram = sum((r.columns.T @ r.columns for r in others), weak)
         leverage = np.sum(self.columns * np.linalg.solve(gram, self.columns.T).T, axis=1)
         which = leverage < 1.0
         names = ("left", "columns", "recorded", "states", "time")

@@ -186,14 +186,9 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
             return NotItself("it takes the place of the friction, which another friction would")
     if _has_lost_inertia(before.fit, fit):
         return NotItself("it takes the place of the inertia")
-    if dataset.channel_delay > 0.0 and _is_late(effect):
+    if dataset.channel_delay > 0.0 and effect.delays:
         return NotItself("the force acts before its time stamp, where it would act after it")
     return None
-
-
-def _is_late(effect: Effect) -> bool:
-    """Whether a force acts, or a motion is read, the later for an effect."""
-    return effect.dead_time or (effect.kind is Kind.ACTUATION and bool(effect.states))
 
 
 def imitation_of(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:

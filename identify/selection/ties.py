@@ -1,9 +1,10 @@
 """Ties: changes that explain the logs as well as one that was found, beside all else that was.
 
 When a search compared an early change with its rivals, the later ones were still missing. So they
-are compared again at its end: every one that was level with it, and of a friction or a resonance
-all others of the catalogue, whatever their own fits ended in. A rival is one that was fitted in its
-place, whose values can be its own there, and that takes a part of what is left without.
+are compared again at its end: every one that was level with it or came near, and of a friction, a
+resonance or a delay all others of the catalogue, whatever their own fits ended in. A rival is one
+that was fitted in its place, whose values can be its own there, and that takes a part of what is
+left without.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from identify.selection.candidates import candidate_of, doubt
 from identify.selection.changes import Added, Screening
 from identify.selection.search import Found, Step, is_tied, replaced, simplest
 from identify.selection.trying import Tried, fitted_anew, parameters, refitted_on
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted
 
 ALIKE = (Kind.FRICTION, Kind.STRUCTURE)  # whose values of one name mean the same in each
@@ -31,7 +32,7 @@ def with_ties(found: Found) -> Found:
     """
     for step in found.steps:
         there = any(s is step for s in found.steps)  # it may have gone with a law that was replaced
-        if there and (step.tied or _others_alike(step, found)):
+        if there and _rivals(step, found):
             found = _compared_again(step, found)
     return found
 
@@ -42,8 +43,7 @@ def _compared_again(step: Step, found: Found) -> Found:
     if axis is None:
         return _with_step(found, step, replace(step, tied=()), final)
     without, own = refitted_on(axis, final), replace(step.tried, judged=final)
-    rivals = {t.change.name: t for t in (*_others_alike(step, found), *step.tied)}
-    fitted = (_in_its_place(t, own, without, found) for t in rivals.values())
+    fitted = (_in_its_place(t, own, without, found) for t in _rivals(step, found))
     tied = [t for t in fitted if t is not None]
     # Another shape of a law was fitted beside what the search had then, and cannot lead; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
@@ -58,6 +58,13 @@ def _compared_again(step: Step, found: Found) -> Found:
     leader = replace(leader, judged=fitted_anew(leader.judged))
     led = _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
     return _less_replaced(step.change.name, led)
+
+
+def _rivals(step: Step, found: Found) -> list[Tried]:
+    """What may be level with a step beside all that was found since; each law once."""
+    near = (t for t in step.kin if isinstance(t.change, Added))
+    every = (*_others_alike(step, found), *near, *step.tied)
+    return [*{t.change.name: t for t in every if t.change.name != step.change.name}.values()]
 
 
 def _less_replaced(name: str, found: Found) -> Found:
@@ -95,7 +102,7 @@ def _in_its_place(rival: Tried, own: Tried, without: Judged, found: Found) -> Tr
 def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
     """The values to fit a rival from: its own, if it was refitted, and those of what was found."""
     law = rival.judged.fit.axis[rival.change.name]
-    if rival.candidate.score:
+    if rival.candidate.score or law.effect.delays:
         yield law
     if law.effect.kind in ALIKE:  # whose values were those of another model
         yield _as_free_as(own.judged.fit.axis[own.change.name], law)
@@ -115,18 +122,23 @@ def _level(axis: AxisModel, rival: Tried, own: Tried, without: Judged) -> Tried 
 
 
 def _others_alike(step: Step, found: Found) -> list[Tried]:
-    """All others of the catalogue, where a friction or a resonance was added."""
-    kind = step.change.effect.kind
-    if not isinstance(step.change, Added) or kind not in ALIKE:
+    """All others of the catalogue that are alike, where a law was added."""
+    own = step.change.effect
+    if not isinstance(step.change, Added):
         return []
-    own = {p.name for p in step.change.effect.parameters if not p.strength}
-    others = (c for c in found.ranking if c.effect.kind is kind and not c.doubt)
-    rivals = [c for c in others if own & {p.name for p in c.effect.parameters}]
+    rivals = [c for c in found.ranking if _are_alike(c.effect, own) and not c.doubt]
     changes = [Added(c.effect) for c in rivals]
     return [
         Tried(change, Screening(change, 0.0), Judged(c.fit, found.dataset), c)
         for change, c in zip(changes, rivals, strict=True)
     ]
+
+
+def _are_alike(one: Effect, other: Effect) -> bool:
+    """Whether two laws are both late, or frictions or resonances with a parameter in common."""
+    names = [{p.name for p in e.parameters if not p.strength} for e in (one, other)]
+    same = one.kind is other.kind and one.kind in ALIKE and bool(names[0] & names[1])
+    return same or (one.delays and other.delays)
 
 
 def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
