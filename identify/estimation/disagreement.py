@@ -42,7 +42,8 @@ class _Rows:
     """Of one log what tells: residual (n,) N, its columns (n, k), states (n, 4), times (n,) s.
 
     recorded (n, 3): N per unit of each of Recorded. size (k + 3,): N per unit, by which the columns
-    were divided; 1 of those of the recording. kept: which test functions tell.
+    were divided; 1 of those of the recording. named (k + 3,): which of these may be another value
+    of one log; a point of a free curve is none. kept: which test functions tell.
     """
 
     log: PreparedLog
@@ -52,6 +53,7 @@ class _Rows:
     states: Array
     time: Array
     size: Array
+    named: NDArray[np.bool_]
     kept: NDArray[np.bool_]
 
     @cached_property
@@ -180,9 +182,11 @@ def _rows(
     usual = np.sqrt(np.mean(np.concatenate(states) ** 2, axis=0))
     usual = np.where(usual > 0.0, usual, 1.0)
     size = np.append(size, np.ones(len(Recorded)))
+    curves = {f.effect.name for f in axis.effects if f.effect.is_nonparametric}
+    named = np.array([*(w.effect not in curves for w in where), *(True for _ in Recorded)])
     parts = zip(logs, left, columns, states, kept, strict=True)
     return [
-        _Rows(g, r[k], c[k], _recorded(g)[k], s[k] / usual, g.time[k], size, k)
+        _Rows(g, r[k], c[k], _recorded(g)[k], s[k] / usual, g.time[k], size, named, k)
         for g, r, c, s, k in parts if k.any()
     ]  # fmt: skip
 
@@ -291,7 +295,7 @@ def _best(own: _Rows, left: Array) -> tuple[int, float | None]:
     """
     most = 0.5  # of the squared error, that it takes by itself
     gains, size = _gains(own, left)
-    taken = gains**2 * size / np.sum(left**2)
+    taken = np.where(own.named, gains**2 * size / np.sum(left**2), 0.0)
     best = int(np.argmax(taken))
     return best, float(gains[best]) if taken[best] > most else None
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_logs import RATE, SLIDE, Ride, few, having, logged
+from planted_logs import RATE, SLIDE, Array, Ride, few, having, logged
 
 import identify
 from benchmarks.second_simulator.drives import DRIVES
@@ -216,3 +216,16 @@ def test_what_one_log_hides_is_found(seed, number, lacks, log, what) -> None:
     assert odd is not None
     assert odd.log == log
     assert (odd.otherwise and odd.otherwise.what) == what
+
+
+def test_where_one_log_alone_has_been_a_free_curve_makes_it_not_odd() -> None:
+    """Others predict nothing of the curve there."""
+
+    def bump(x: Array, v: Array) -> Array:
+        return 3.0 * np.exp(-(((x - 0.06) / 0.003) ** 2))
+
+    far = {n: replace(ride, reach=0.1 if n == "run1" else 0.06) for n, ride in RIDES.items()}
+    logs = {name: logged(SLIDE, ride, bump) for name, ride in far.items()}
+    axis = having(SLIDE, "empirical_map")
+    found = identify.fit(replace(MODEL, axes={"x": axis}), logs)
+    assert odd_in(found.fits["x"].axis, found.datasets["x"]) is None
