@@ -80,3 +80,17 @@ def twin(*arguments: str | Path) -> Cost:
     if code not in (0, 1):  # 1: the answer of the command is "no"
         raise RuntimeError(f"{' '.join(command)} ended with {code}")
     return Cost(cpu, wall, memory)
+
+
+def first_line(*arguments: str | Path) -> float:
+    """Wall time in s until a process of `twin` says its first line of progress."""
+    command = [sys.executable, "-c", TWIN, *map(str, arguments)]
+    begun = perf_counter()
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        seconds = perf_counter() - begun
+        process.stderr.read()  # it ends by itself
+    return seconds
