@@ -57,7 +57,7 @@ from twin.errors import InputError
 from twin.logs import GivenLogs, Log, logs_by_name
 from twin.model.file import as_model
 from twin.model.machine import AxisModel, MachineModel
-from twin.parallel import Progress, parallel, silent, within
+from twin.parallel import Progress, parallel, silent, spread, within
 from twin.threads import trim_memory
 
 Model = MachineModel | str | Path
@@ -278,12 +278,14 @@ def diagnose(
     away = departures_of(result.model, result.fits, result.datasets, known, progress)
     # Of a mechanism the joints share their bodies, which were found at one length.
     lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
-    axes = {}
-    for axis, fitted in away.fits.items():
+
+    def told_of(axis: str) -> AxisDiagnosis:
         every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
         of_axis = within(progress, f"diagnosis of {axis}")
-        told = diagnose_axis(fitted, away.datasets[axis], every, of_axis, lengths)
-        axes[axis] = away.with_ties(told)
+        told = diagnose_axis(away.fits[axis], away.datasets[axis], every, of_axis, lengths)
+        return away.with_ties(told)
+
+    axes = dict(zip(away.fits, spread(told_of, away.fits), strict=True))
     bodies = away.bodies_beside(
         {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}
     )

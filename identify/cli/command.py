@@ -246,16 +246,20 @@ def roughly(seconds: float) -> str:
 
 
 class Shown:
-    """Where a command is: called as a `Progress`, from any thread."""
+    """Where a command is: called as a `Progress`, from any thread.
+
+    Who is ahead is shown beside the work that it is of, as several axes may be asked at a time.
+    """
 
     def __init__(self) -> None:
         self.begun = monotonic()
         self.part = Progressed("starting", 0, 0, 0, self.begun, self.begun)
-        self.ahead = ""
+        self.ahead, self.of = "", ""
 
     def __call__(self, what: str, done: int, total: int) -> None:
         if total == 0:
-            self.ahead = f"; {what[what.rfind(AHEAD) :]}" if AHEAD in what else self.ahead
+            if AHEAD in what:
+                self.ahead, self.of = f"; {what[what.rfind(AHEAD) :]}", _whose(what)
             return
         same = what == self.part.what and total == self.part.total and done > self.part.done
         now = monotonic()
@@ -267,7 +271,13 @@ class Shown:
 
     def __str__(self) -> str:
         now = monotonic()
-        return f"{self.part.words(now)}{self.ahead} ({roughly(now - self.begun)} so far)"
+        ahead = self.ahead if self.of == _whose(self.part.what) else ""
+        return f"{self.part.words(now)}{ahead} ({roughly(now - self.begun)} so far)"
+
+
+def _whose(what: str) -> str:
+    """The part of the work that a line of it is of, e.g. the diagnosis of an axis."""
+    return what.partition(", ")[0]
 
 
 @contextmanager
