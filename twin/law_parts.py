@@ -55,12 +55,13 @@ def repeats_after(period: str, else_: Imitated = Imitated.OF_POSITION) -> Knee:
 def slips_after(size: Callable[[Mapping[str, float]], float]) -> Knee:
     """A reach until what sticks slips; from a reversal on it is twice as long.
 
-    Rounded readings turn up to a count after the axis did, and are a count wrong where it slips, so
-    that dry friction by them builds up over two.
+    Rounded readings turn up to a count after the axis did, and as much before it, so that dry
+    friction by them is a reach of about a count: what is to be told from it is clearly longer.
     """
+    clearly = 1.5  # counts
     return Knee(
         "reach", "m", lambda v, e: size(v),
-        lambda v, e: (max(e.shortest, 2.0 * e.resolution), 0.5 * (e.been[1] - e.been[0])),
+        lambda v, e: (max(e.shortest, clearly * e.resolution), 0.5 * (e.been[1] - e.been[0])),
         Imitated.DRY_FRICTION, Imitated.SPRING,
     )  # fmt: skip
 
