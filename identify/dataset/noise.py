@@ -34,6 +34,8 @@ from identify.dataset.prepared_log import on_blocks, stands, sticks, total_force
 from identify.dataset.readings import part_left, rate_gain, white_rounding
 from identify.dataset.spectrum import densities, fitted_levels, median_spectrum, pieces_of
 from identify.dataset.test_function import TestFunction
+from twin.core.walks import walk_sets
+from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.signals import Array, between
 
@@ -102,7 +104,7 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     segment = min(max(round(0.25 / dt), 256), len(raw))
     frequency, power = median_spectrum(raw, segment, dt, rests)
     half = np.cos(np.pi * frequency * dt) ** 2
-    gain = (rate_gain(frequency, dt) * axis.mass) ** 2
+    gain = (rate_gain(frequency, dt) * axis.mass) ** 2 * _hung_gain(axis, motion, frequency)
     bend = np.asarray(gain * part_left(motion.velocity_weight, frequency, dt))
     first, beside, top = BAND
     top = HALF if motion.velocity_weight else top
@@ -123,6 +125,35 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     if float((power / half)[2 : np.flatnonzero(band)[0]].min(initial=np.inf)) < 0.1 * more:
         more = scatter = 0.0
     return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
+
+
+def _hung_gain(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
+    """Power (k,) of the force that an acceleration of the axis takes, over that of its mass alone.
+
+    At these frequencies (k,) Hz. What hangs on the axis, or what this stands on, answers the noise
+    of the readings as it does the motion: at its resonance with many times the force. By the answer
+    to a jump of the velocity to the highest of the motion, at which a play is crossed.
+    """
+    hung = [f for f in axis.effects if f.effect.kind is Kind.STRUCTURE]
+    if not hung:
+        return np.ones_like(frequency)
+    fine, long = 4, 16  # steps a sample; lines of a spectrum for each of these
+    period = motion.sample_period / fine
+    velocity = np.full(2 * (len(frequency) - 1) * fine * long, motion.raw[0].max() or 1.0)
+    velocity[: fine * long] = 0.0
+    table = on_blocks(replace(axis, effects=tuple(hung)))
+    along = np.stack([np.cumsum(velocity) * period, velocity, np.zeros_like(velocity)])
+    force, (first, last, *_) = np.zeros((1, len(velocity))), table.axes[0]
+    walk_sets(
+        table.entries, first, last, table.parameters[None], table.n_states, along,
+        np.zeros_like(along), period, 0, force, table.masses[0], 0.0, table.remembers, velocity,
+    )  # fmt: skip
+    alone = np.fft.rfft(axis.mass * np.gradient(velocity, period))
+    taken = alone - np.fft.rfft(force[0])
+    lines = slice(0, (len(frequency) - 1) * long + 1)
+    power = np.abs(taken[lines]) ** 2 / np.maximum(np.abs(alone[lines]) ** 2, 1e-300)
+    means = np.add.reduceat(power[long // 2 :], np.arange(0, len(power) - long // 2, long)) / long
+    return np.concatenate([power[:1], means])[: len(frequency)]
 
 
 def _rounding_of(signal: Array, period: float) -> float:
