@@ -105,9 +105,11 @@ class Added:
             parts = []
             for logs, before in grounds:
                 both = moving(logs, sticks(fit.axis) or sticks(new.axis))
+                if not both.any():
+                    continue  # these beginnings rest
                 was, now = (r[both] @ r[both] for r in (before, residual(new.axis, logs)))
                 parts.append(part_of(was / both.sum(), now / both.sum(), fit.floor**2))
-            return max(parts)
+            return max(parts, default=0.0)
 
         # 4 evaluations: more do not change which start is best
         fits = [fit_roughly(fit.axis.with_effect(s.fitted), heads, 4) for s in found]
