@@ -19,7 +19,7 @@ from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.lengths import at_another_length
 from identify.selection.odd_logs import without_odd_log
-from identify.selection.roles import RoleDependent, role_dependent
+from identify.selection.roles import RoleDependent, role_dependent, with_exchanged
 from identify.selection.search import Found, Step
 from twin.effects import Catalogue
 from twin.parallel import Progress, silent
@@ -138,8 +138,9 @@ def diagnose_axis(
         return at_another_length(ended, lengths, catalogue, progress)
 
     ended, odd = without_odd_log(base, dataset, conclude)
-    found, findings = ended.found, ended.findings
-    final = found.final
+    found, final = ended.found, ended.found.final
+    by_roles = role_dependent(found, ended.findings)
+    findings = with_exchanged(ended.findings, by_roles)
     # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
@@ -155,7 +156,7 @@ def diagnose_axis(
         unexplained=None if quiet else find_dependence(final.fit, found.dataset),
         small=_small(found),
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
-        by_roles=role_dependent(found, findings),
+        by_roles=by_roles,
     )
 
 

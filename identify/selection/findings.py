@@ -125,7 +125,8 @@ class Finding:
     left_fitted: over the noise floor, the error that all findings together leave on the logs that
     chose, and on the training logs. doubt: why
     its values cannot be its own, in words; None where they can. imitated: what its law is on this
-    motion, where no more than that is proved.
+    motion, where no more than that is proved. exchanged: part and t of its score with training and
+    selection logs exchanged, where it is not proved so; None where it is, or nobody asked.
     """
 
     effect: str
@@ -145,6 +146,7 @@ class Finding:
     left_fitted: float = 1.0
     doubt: str | None = None
     imitated: Imitated | None = None
+    exchanged: tuple[float, float] | None = None
     parameter_units: dict[str, str] = field(default_factory=dict)
     equation: str = ""
 
@@ -175,9 +177,14 @@ class Finding:
 
     @property
     def confidence(self) -> float | None:
-        """How often such an answer was right, 0..1; None where test logs contradict it."""
-        refuted = self.state is Confirmation.CONTRADICTED
-        return None if refuted else confidence(self.score.part, self.score.t)
+        """How often such an answer was right, 0..1; None where test logs contradict it.
+
+        By the weaker of its scores, where the logs with their roles exchanged do not prove it.
+        """
+        if self.state is Confirmation.CONTRADICTED:
+            return None
+        own = (self.score.part, self.score.t)
+        return min(confidence(*each) for each in (own, self.exchanged or own))
 
 
 def findings_of(found: Found) -> tuple[Finding, ...]:

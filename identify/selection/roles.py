@@ -43,6 +43,14 @@ def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDepen
     return (*_lost(found, findings, final), *_gained(found))
 
 
+def with_exchanged(
+    findings: Sequence[Finding], laws: Sequence[RoleDependent]
+) -> tuple[Finding, ...]:
+    """Findings with what they take where exchanged roles do not prove them."""
+    lost = {law.effect: (law.part, law.t) for law in laws if law.named}
+    return tuple(replace(f, exchanged=lost.get(f.effect)) for f in findings)
+
+
 def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[RoleDependent]:
     """Of the findings those that are not proved with the roles exchanged."""
     base = found.base.fit.axis

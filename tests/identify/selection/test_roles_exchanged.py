@@ -28,12 +28,14 @@ def test_a_law_that_one_log_alone_proves_is_told_to_depend_on_which_log_chooses(
     assert found.named == (("cogging",) if named else ())
     (law,) = found.by_roles
     assert (law.effect, law.named) == ("cogging", named)
+    assert all(f.confidence is not None and f.confidence <= 0.75 for f in found.findings)
 
 
 def test_of_a_law_that_both_logs_prove_nothing_of_the_kind_is_told() -> None:
     found = diagnosed(0.1, Ride(2))
     assert found.named == ("cogging",)
     assert not found.by_roles
+    assert found.findings[0].confidence == pytest.approx(0.99)
 
 
 def test_a_law_that_a_touched_log_hides_is_told_to_depend_on_roles_whichever_log_chooses() -> None:
