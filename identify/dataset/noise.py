@@ -37,7 +37,7 @@ from identify.dataset.test_function import TestFunction
 from twin.core.walks import walk_sets
 from twin.effect import Kind
 from twin.model.machine import AxisModel
-from twin.signals import Array, between
+from twin.signals import Array, between, rate
 
 BAND = (50.0, 0.1, 0.45)  # fit from 50 Hz or this part of the sample rate, to that part of it
 HALF = 0.25  # of the sample rate: beyond, a command has no motion, a measured velocity little noise
@@ -148,7 +148,7 @@ def _hung_gain(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
         table.entries, first, last, table.parameters[None], table.n_states, along,
         np.zeros_like(along), period, 0, force, table.masses[0], 0.0, table.remembers, velocity,
     )  # fmt: skip
-    alone = np.fft.rfft(axis.mass * np.gradient(velocity, period))
+    alone = np.fft.rfft(axis.mass * rate(velocity, period))
     taken = alone - np.fft.rfft(force[0])
     lines = slice(0, (len(frequency) - 1) * long + 1)
     power = np.abs(taken[lines]) ** 2 / np.maximum(np.abs(alone[lines]) ** 2, 1e-300)
