@@ -120,10 +120,13 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
 
     Fitted again and judged with the roles as they are: what it takes is to be seen either way, but
     a start that the one group of logs hides, the other may show. Whoever looks twice finds more by
-    chance: so many more changes is each one of.
+    chance: so many more changes is each one of. Nothing is asked where a law was doubted at the end
+    of a search, as its kin would be one after another; nor of a joint beside its bodies, which all
+    of the logs chose.
     """
-    dataset = judged.dataset.exchanged
-    if dataset is None or judged.at_floor:
+    own = judged.dataset
+    dataset = None if own.beside_bodies or trial.barred or judged.at_floor else own.exchanged
+    if dataset is None:
         return []
     there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
     tried = tried_beside(there, trial, within(progress, "training and selection logs exchanged"))[1]
