@@ -62,3 +62,17 @@ def test_what_came_near_is_compared_again_beside_the_other_of_a_pair() -> None:
     ]  # fmt: skip
     assert found.named == ("actuator_lag", "lugre")
     assert found.findings[0].parameters["tau"] == pytest.approx(plant.lag, rel=0.06)
+
+
+@pytest.mark.slow
+def test_late_laws_are_compared_again_beside_what_was_found_since() -> None:
+    """A late reading takes most while the bristle is missing; beside it the loop's lag does."""
+    drive = DRIVES["cart"]
+    recorder = next(r for r in drive.recorders if r.rate == 500)
+    plant = HIDDEN["lag"][0](drive, recorder)
+    logs = [log_of(drive, plant, recorder, 201105 + i) for i in (1, 0)]
+    model = first_model({"log": logs[0]}, "cart", CATALOGUE)
+    known = few("coulomb_viscous", "encoder_delay", "actuator_lag", "lugre")
+    found = identify.diagnose(model, *logs, catalogue=known).axes["q"]
+    assert found.answers == (("actuator_lag", "encoder_delay"), ("lugre",))
+    assert found.findings[0].parameters["tau"] == pytest.approx(plant.lag, rel=0.06)
