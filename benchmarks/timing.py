@@ -64,13 +64,17 @@ class Cost:
     memory: float
 
 
+def _command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-c", TWIN, *map(str, arguments)]
+
+
 def twin(*arguments: str | Path) -> Cost:
     """The cost of a process of `twin`, whose output is not shown.
 
     Raises RuntimeError where it ends in an error. Its Python keeps the modules that it has
     compiled, as that of a user does.
     """
-    command = [sys.executable, "-c", TWIN, *map(str, arguments)]
+    command = _command(*arguments)
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", LAUNCHER, *command], cwd=ROOT,
         env={k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"},
@@ -84,10 +88,9 @@ def twin(*arguments: str | Path) -> Cost:
 
 def first_line(*arguments: str | Path) -> float:
     """Wall time in s until a process of `twin` says its first line of progress."""
-    command = [sys.executable, "-c", TWIN, *map(str, arguments)]
     begun = perf_counter()
     with subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        _command(*arguments), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
         process.stderr.readline()

@@ -279,13 +279,13 @@ def diagnose(
     # Of a mechanism the joints share their bodies, which were found at one length.
     lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
 
-    def told_of(axis: str) -> AxisDiagnosis:
+    def diagnosed(axis: str) -> AxisDiagnosis:
         every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
         of_axis = within(progress, f"diagnosis of {axis}")
-        told = diagnose_axis(away.fits[axis], away.datasets[axis], every, of_axis, lengths)
-        return away.with_ties(told)
+        own = diagnose_axis(away.fits[axis], away.datasets[axis], every, of_axis, lengths)
+        return away.with_ties(own)
 
-    axes = dict(zip(away.fits, spread(told_of, away.fits), strict=True))
+    axes = dict(zip(away.fits, spread(diagnosed, away.fits), strict=True))
     bodies = away.bodies_beside(
         {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}
     )

@@ -28,7 +28,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from identify.dataset.drive import actual_force
+from identify.dataset.drive import actual_force, parts_of
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import on_blocks, stands, sticks, total_force
 from identify.dataset.readings import part_left, rate_gain, white_rounding
@@ -134,14 +134,14 @@ def _hung_gain(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
     of the readings as it does the motion: at its resonance with many times the force. By the answer
     to a jump of the velocity to the highest of the motion, at which a play is crossed.
     """
-    hung = [f for f in axis.effects if f.effect.kind is Kind.STRUCTURE]
-    if not hung:
+    hung = parts_of(axis, Kind.STRUCTURE)
+    if not hung.effects:
         return np.ones_like(frequency)
     fine, long = 4, 16  # steps a sample; lines of a spectrum for each of these
     period = motion.sample_period / fine
     velocity = np.full(2 * (len(frequency) - 1) * fine * long, motion.raw[0].max() or 1.0)
     velocity[: fine * long] = 0.0
-    table = on_blocks(replace(axis, effects=tuple(hung)))
+    table = on_blocks(hung)
     along = np.stack([np.cumsum(velocity) * period, velocity, np.zeros_like(velocity)])
     force, (first, last, *_) = np.zeros((1, len(velocity))), table.axes[0]
     walk_sets(

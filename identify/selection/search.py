@@ -187,11 +187,10 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         if not steps:
             doubted = (c for c in ranking if c.effect.name in found.barred)
             first, ranking = judged, ordered([*candidates, *doubted])
-        new = _accepted(judged, last)
-        if not new:
+        if not (new := _accepted(judged, last)):
             exchanged = tried_exchanged(judged, trial, step)
             new = _accepted(judged, exchanged) or _together(judged, last, trial, step)
-        new = new or _of_position([*last, *exchanged])
+            new = new or _of_position([*last, *exchanged])
         if not new:
             break
         exchanged = []

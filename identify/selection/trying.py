@@ -116,11 +116,11 @@ def tried_beside(
 
 
 def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) -> list[Tried]:
-    """What is proved with training and selection logs exchanged, and comes near as they are.
+    """What is proved with training and selection logs exchanged, judged with the roles as they are.
 
-    Fitted again and judged with the roles as they are: what it takes is to be seen either way, but
-    a start that the one group of logs hides, the other may show. Whoever looks twice finds more by
-    chance: so many more changes is each one of. Nothing is asked where a law was doubted at the end
+    Fitted again for that: what it takes is to be seen either way, but a start that the one group of
+    logs hides, the other may show. Whoever looks twice finds more by chance, so that each is one of
+    twice as many changes. Nothing is asked where a law was doubted at the end
     of a search, as its kin would be one after another; nor of a joint beside its bodies, which all
     of the logs chose.
     """
