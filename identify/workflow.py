@@ -31,7 +31,7 @@ from identify.estimation.variable_projection import usable
 from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
-from identify.mechanism.departures import departures_of
+from identify.mechanism.departures import Departures, departures_of
 from identify.output.frequency import frequency_text as frequency_text  # results print themselves
 from identify.output.text import diagnose_text as diagnose_text
 from identify.results.frequency import FrequencyResponse
@@ -279,13 +279,16 @@ def diagnose(
     # Of a mechanism the joints share their bodies, which were found at one length.
     lengths = TEST_FUNCTIONS if test_function is None and model.mjcf is None else ()
 
-    def diagnosed(axis: str) -> AxisDiagnosis:
+    def diagnosed(away: Departures, axis: str) -> AxisDiagnosis:
         every = away.offered(offered(result.given.axes[axis], result.datasets[axis], known), axis)
         of_axis = within(progress, f"diagnosis of {axis}")
         own = diagnose_axis(away.fits[axis], away.datasets[axis], every, of_axis, lengths)
         return away.with_ties(own)
 
-    axes = dict(zip(away.fits, spread(diagnosed, away.fits), strict=True))
+    axes = dict(zip(away.fits, spread(partial(diagnosed, away), away.fits), strict=True))
+    progress("bodies, rotors and motors beside what was found", 0, 1)
+    away, anew = away.asked_again(axes)
+    axes |= zip(anew, spread(partial(diagnosed, away), anew), strict=True)
     bodies = away.bodies_beside(
         {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}
     )

@@ -17,6 +17,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit, fit_axis
+from identify.estimation.found_shape import held_strengths
 from identify.estimation.intervals import half_widths_by
 from identify.mechanism.bodies import WrongBody
 from identify.mechanism.choice import Choice, Moved
@@ -27,7 +28,7 @@ from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.what import What
 from twin.effects import Catalogue
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, silent
 from twin.signals import Array
 
@@ -105,6 +106,46 @@ class Departures:
             )
             for name, body in first.items()
         )  # fmt: skip
+
+    def asked_again(self, axes: Mapping[str, AxisDiagnosis]) -> tuple[Departures, tuple[str, ...]]:
+        """What must move too beside all that was found of the joints, and the joints it is of.
+
+        A law that a joint lacked, such as a friction, may have hidden what else moves: a group that
+        a joint cannot have by itself was asked only without it. Nothing is asked where the joints
+        lacked nothing, or where only noise is left of every one.
+        """
+        ends = {a: _on_beginnings(d.final, d.dataset) for a, d in axes.items()}
+        lacked = any(d.steps for d in axes.values())
+        if not self.groups or not lacked or all(j.at_floor for j in ends.values()):
+            return self, ()
+        regression = regression_of(ends, self._beside({a: j.fit.axis for a, j in ends.items()}))
+        known = {(m.group.what, m.group.place) for m in self.moved}
+        moved = Choice(regression).moved()
+        new = [m for m in moved if (m.group.what, m.group.place) not in known]
+        found = _with_bodies(replace(self, moved=new, bodies=()), regression)
+        for group in self.groups:
+            if group.body is not None:
+                group.body.forget()
+        found = replace(found, moved=(*self.moved, *new), bodies=(*self.bodies, *found.bodies))
+        where = found.fits if len(found.bodies) > len(self.bodies) else (m.group.axis for m in new)
+        return found, tuple(dict.fromkeys(where))
+
+    def _beside(self, axes: Mapping[str, AxisModel]) -> list[Group]:
+        """The groups that may move beside joints as they were found, with bodies as corrected.
+
+        Those of which a joint has a law by now are among its own parameters.
+        """
+        changes = {body.body: body.change for body in self.bodies}
+
+        def has_it(group: Group) -> bool:
+            free = (f for f in axes[group.axis].effects if held_strengths(f) == ())
+            return any(group.what.covers(f.effect) for f in free)
+
+        return [
+            replace(g, corrected=changes.get(g.place, 0.0) if g.what is What.BODY else 0.0)
+            for g in self.groups
+            if g.what is What.BODY or not has_it(g)
+        ]
 
     def told(self, group: Group) -> str:
         """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
