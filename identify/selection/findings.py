@@ -316,7 +316,7 @@ def _shaped(finding: Finding, change: Change, less: Fit, found: Found) -> Findin
     if isinstance(change, Freed):
         bend = FreeExponent(
             change.parameter, change.held, final.axis[name].values[change.parameter],
-            change.effect.parameter(change.parameter).unit,
+            final.axis.units(change.effect.parameter(change.parameter).unit),
         )  # fmt: skip
         if change.is_strength:
             return replace(finding, kind=FindingKind.WRONG_VALUE, bend=bend)
