@@ -127,6 +127,19 @@ def test_a_body_is_told_beside_the_friction_that_was_found_after_it():
 
 
 @pytest.mark.slow
+def test_a_rotor_that_a_lacking_friction_hides_is_asked_again_beside_it():
+    arm = replace(arm_of(("0 1 0",)), presliding=True)
+    changed = Changed(rotor={0: 0.1 * inertia(arm)[0]})
+    logs = [{f"{i}": log_of(arm, changed, 40 + i, 8.0)} for i in range(2)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", arm.text))
+    few = Catalogue([CATALOGUE[n] for n in ("rotor_inertia", "lugre", "dahl")])
+    fitted = fit(model, *logs)
+    alone = departures_of(fitted.model, fitted.fits, fitted.datasets, few)
+    assert What.ROTOR not in [m.group.what for m in alone.moved]
+    assert "rotor_inertia" in diagnose(model, *logs, catalogue=few).axes["joint1"].named
+
+
+@pytest.mark.slow
 def test_a_spring_that_turns_as_the_weight_does_is_no_doubt_beside_all_bodies():
     """One joint alone takes a tenth of its weight for it; all joints at once do not."""
     own = machine(98, 21)
