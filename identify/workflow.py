@@ -286,8 +286,7 @@ def diagnose(
         return away.with_ties(own)
 
     axes = dict(zip(away.fits, spread(partial(diagnosed, away), away.fits), strict=True))
-    progress("bodies, rotors and motors beside what was found", 0, 1)
-    away, anew = away.asked_again(axes)
+    away, anew = away.asked_again(axes, progress)
     axes |= zip(anew, spread(partial(diagnosed, away), anew), strict=True)
     bodies = away.bodies_beside(
         {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}

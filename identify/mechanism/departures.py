@@ -86,63 +86,62 @@ class Departures:
         """
         if not self.bodies:
             return ()
-        before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
-        first = {body.body: body for body in self.bodies}
-        moved = [
-            replace(g, corrected=first[g.place].change)
-            for g in self.groups
-            if g.what is What.BODY and g.place in first
-        ]
         gains = [g for g in self.groups if g.what is What.GAIN]
-        told = _Told.of(regression_of(before, [*moved, *gains]), moved)
-        for group in moved:
-            assert group.body is not None
-            group.body.forget()
+        moved = self._corrected
+        told = _Told.of(_regression(_all_on_beginnings(fits, datasets), [*moved, *gains]), moved)
         return tuple(
             replace(
-                body, change=body.change + told.changes[name],
-                band=np.hypot(told.bands[name], told.changes[name]),
-                disagreeing=told.disagreeing[name],
+                body, change=body.change + told.changes[body.body],
+                band=np.hypot(told.bands[body.body], told.changes[body.body]),
+                disagreeing=told.disagreeing[body.body],
             )
-            for name, body in first.items()
+            for body in self.bodies
         )  # fmt: skip
 
-    def asked_again(self, axes: Mapping[str, AxisDiagnosis]) -> tuple[Departures, tuple[str, ...]]:
+    def asked_again(
+        self, axes: Mapping[str, AxisDiagnosis], progress: Progress = silent
+    ) -> tuple[Departures, tuple[str, ...]]:
         """What must move too beside all that was found of the joints, and the joints it is of.
 
         A law that a joint lacked, such as a friction, may have hidden what else moves: a group that
         a joint cannot have by itself was asked only without it. Nothing is asked where the joints
         lacked nothing, or where only noise is left of every one.
         """
-        ends = {a: _on_beginnings(d.final, d.dataset) for a, d in axes.items()}
-        lacked = any(d.steps for d in axes.values())
-        if not self.groups or not lacked or all(j.at_floor for j in ends.values()):
+        if not self.groups or not any(d.steps for d in axes.values()):
             return self, ()
-        regression = regression_of(ends, self._beside({a: j.fit.axis for a, j in ends.items()}))
+        ends = {a: _on_beginnings(d.final, d.dataset) for a, d in axes.items()}
+        if all(judged.at_floor for judged in ends.values()):
+            return self, ()
+        progress("bodies, rotors and motors beside what was found", 0, 1)
+        regression = _regression(ends, self._beside({a: j.fit.axis for a, j in ends.items()}))
         known = {(m.group.what, m.group.place) for m in self.moved}
         moved = Choice(regression).moved()
         new = [m for m in moved if (m.group.what, m.group.place) not in known]
         found = _with_bodies(replace(self, moved=new, bodies=()), regression)
-        for group in self.groups:
-            if group.body is not None:
-                group.body.forget()
-        found = replace(found, moved=(*self.moved, *new), bodies=(*self.bodies, *found.bodies))
-        where = found.fits if len(found.bodies) > len(self.bodies) else (m.group.axis for m in new)
-        return found, tuple(dict.fromkeys(where))
+        where = found.fits if found.bodies else (m.group.axis for m in new)
+        both = (*self.moved, *new), (*self.bodies, *found.bodies)
+        return replace(found, moved=both[0], bodies=both[1]), tuple(dict.fromkeys(where))
+
+    @property
+    def _corrected(self) -> list[Group]:
+        """The bodies that moved, as they were corrected."""
+        changes = {body.body: body.change for body in self.bodies}
+        own = (g for g in self.groups if g.what is What.BODY and g.place in changes)
+        return [replace(g, corrected=changes[g.place]) for g in own]
 
     def _beside(self, axes: Mapping[str, AxisModel]) -> list[Group]:
         """The groups that may move beside joints as they were found, with bodies as corrected.
 
         Those of which a joint has a law by now are among its own parameters.
         """
-        changes = {body.body: body.change for body in self.bodies}
 
         def has_it(group: Group) -> bool:
-            free = (f for f in axes[group.axis].effects if held_strengths(f) == ())
-            return any(group.what.covers(f.effect) for f in free)
+            free = (f.effect for f in axes[group.axis].effects if not held_strengths(f))
+            return any(group.what.covers(effect) for effect in free)
 
+        corrected = {g.place: g for g in self._corrected}
         return [
-            replace(g, corrected=changes.get(g.place, 0.0) if g.what is What.BODY else 0.0)
+            corrected.get(g.place, g) if g.what is What.BODY else g
             for g in self.groups
             if g.what is What.BODY or not has_it(g)
         ]
@@ -167,7 +166,7 @@ def departures_of(
     nothing = Departures(datasets, fits)
     if not model.joints:
         return nothing
-    before = {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
+    before = _all_on_beginnings(fits, datasets)
     if all(judged.at_floor for judged in before.values()):
         return nothing
     from twin.model.bodies import mechanism_in  # MuJoCo takes long to load
@@ -177,14 +176,27 @@ def departures_of(
     progress("bodies, rotors and motors of all joints", 0, 1)
     axes = {axis: judged.fit.axis for axis, judged in before.items()}
     reaches = {axis: _reach(judged.dataset) for axis, judged in before.items()}
-    regression = regression_of(before, groups_of(bodies, axes, reaches))
-    for body in bodies:
-        body.forget()
+    regression = _regression(before, groups_of(bodies, axes, reaches))
     moved = Choice(regression).moved()
     names = {what: what.named(catalogue) for what in What}
     beside = {axis: replace(own, beside_bodies=True) for axis, own in datasets.items()}
     found = Departures(beside, fits, moved, names=names, groups=regression.groups)
     return _with_bodies(found, regression)
+
+
+def _regression(before: Mapping[str, Judged], groups: Sequence[Group]) -> Regression:
+    """The regression of joints, whose bodies then let go of what they know of the logs."""
+    regression = regression_of(before, groups)
+    for group in groups:
+        if group.body is not None:
+            group.body.forget()
+    return regression
+
+
+def _all_on_beginnings(
+    fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]
+) -> dict[str, Judged]:
+    return {axis: _on_beginnings(fits[axis], datasets[axis]) for axis in fits}
 
 
 def _on_beginnings(fit: Fit, dataset: Dataset) -> Judged:
