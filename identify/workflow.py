@@ -44,6 +44,7 @@ from identify.results.results import (
     OnMachine,
     SimulationFit,
     summary_of,
+    with_all_found,
 )
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import physics_alone
@@ -299,7 +300,9 @@ def diagnose(
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
-    found = Diagnosis(
+    better = with_all_found(model, axes, summaries, bodies)
+    run = partial(position_errors, progress=partial(progress, "comparing with all that was found"))
+    return Diagnosis(
         fitted=model,
         axes=axes,
         comparison=_compared(model, prepared, {a: t.floor for a, t in summaries.items()}, progress),
@@ -311,9 +314,9 @@ def diagnose(
         left_over={axis: region for axis, region in regions.items() if region},
         bodies=bodies,
         recording=given.recording,
+        model=better,
+        free_runs={} if better is model else run(better, prepared)[0],
     )
-    _ = found.model  # it is complete: to tell it computes nothing
-    return found
 
 
 def _recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:

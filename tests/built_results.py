@@ -28,6 +28,7 @@ from identify.results.results import (
     Feedforward,
     FitResult,
     SimulationFit,
+    with_all_found,
 )
 from identify.selection.acceptance import Score, Taken
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -222,6 +223,8 @@ def diagnosed(x: AxisDiagnosis | None = None) -> Diagnosis:
         MODEL, axes, compared(), summaries,
         {"x": plan_of("cogging", "quadratic_drag")}, {"x": refit_of(0.0), "y": refit_of(0.01)},
         left_over={"x": LEFT_OVER} if x and x.unexplained else {},
+        model=MODEL if x and x.final is not FINAL else with_all_found(MODEL, axes, summaries),
+        free_runs={"x": {"run 1": 4.1e-7, "run 2": 3.9e-7}},
     )  # fmt: skip
 
 

@@ -10,7 +10,13 @@ from pathlib import Path
 from identify import adding, workflow
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.results import Addition, Comparison, Diagnosis, summary_of
+from identify.results.results import (
+    Addition,
+    Comparison,
+    Diagnosis,
+    summary_of,
+    with_all_found,
+)
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.logs import Log
@@ -44,7 +50,9 @@ class Case:
     def concluding(self, x: AxisDiagnosis) -> Diagnosis:
         """The same diagnosis with another conclusion."""
         told = {"x": summary_of(x)}
-        return Diagnosis(self.diagnosis.fitted, {"x": x}, self.diagnosis.comparison, told)
+        fitted, compared = self.diagnosis.fitted, self.diagnosis.comparison
+        better = with_all_found(fitted, {"x": x}, told)
+        return Diagnosis(fitted, {"x": x}, compared, told, model=better)
 
     @property
     def quiet(self) -> AxisDiagnosis:

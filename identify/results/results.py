@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -110,6 +109,8 @@ class Comparison(Pictured):
     """The errors of a model on logs, by axis.
 
     recording: how the logs of a mechanism are another than its file needs; all is of them so read.
+    model: with everything that was found, fitted together, and how its errors fell. free_runs: its
+    free-running position error, axis -> training log -> m RMS; none where nothing was found.
     """
 
     model: MachineModel
@@ -254,28 +255,13 @@ class Diagnosis(Pictured):
     left_over: Mapping[str, Region] = field(default_factory=dict)
     bodies: tuple[WrongBody, ...] = ()
     recording: Recording | None = None
+    model: MachineModel = field(kw_only=True)
+    free_runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def body(self) -> WrongBody | None:
         """That of the bodies which explains most."""
         return next(iter(self.bodies), None)
-
-    @cached_property
-    def model(self) -> MachineModel:
-        """The model with everything that was found, fitted together, and how its errors fell."""
-        model, bodies = self.fitted, self.bodies
-        if bodies and model.joints:
-            fits = {axis: found.base for axis, found in self.axes.items()}
-            model = corrected(model, bodies, fits, f"{model.name}_corrected.xml")
-        for axis, found in self.axes.items():
-            if found.findings:
-                mass = model.axes[axis].mass if bodies else found.final.axis.mass
-                better = replace(found.final.axis, mass=mass)
-                model = model.with_axis(axis, found.dataset.kept_in(better))
-                after = self.summaries[axis].after
-                model = model.with_intervals(axis, intervals_to_keep(found.final, after))
-                model = model.with_history(*_steps_of(found))
-        return model
 
     @property
     def leading(self) -> AxisDiagnosis:
@@ -294,6 +280,28 @@ class Diagnosis(Pictured):
         """The effect that is named, if any."""
         best = self.leading.best
         return best.effect if best else None
+
+
+def with_all_found(
+    fitted: MachineModel,
+    axes: Mapping[str, AxisDiagnosis],
+    summaries: Mapping[str, AxisSummary],
+    bodies: Sequence[WrongBody] = (),
+) -> MachineModel:
+    """A fitted model with everything that was found, and how its errors fell; see Diagnosis."""
+    model = fitted
+    if bodies and model.joints:
+        fits = {axis: found.base for axis, found in axes.items()}
+        model = corrected(model, bodies, fits, f"{model.name}_corrected.xml")
+    for axis, found in axes.items():
+        if found.findings:
+            mass = model.axes[axis].mass if bodies else found.final.axis.mass
+            better = replace(found.final.axis, mass=mass)
+            model = model.with_axis(axis, found.dataset.kept_in(better))
+            after = summaries[axis].after
+            model = model.with_intervals(axis, intervals_to_keep(found.final, after))
+            model = model.with_history(*_steps_of(found))
+    return model
 
 
 def _steps_of(found: AxisDiagnosis) -> Iterator[HistoryStep]:

@@ -28,6 +28,7 @@ from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import NotItself, doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.of_bodies import is_of_bodies
+from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.search import Found, Step
 from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
@@ -303,6 +304,8 @@ def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
         return NotItself(
             "another rotor, or bodies with values within a tenth of the file's, explain as much"
         )
+    if own is None and change.effect.delays and is_of_friction(less, final):
+        return IS_FRICTION
     return own
 
 

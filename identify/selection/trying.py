@@ -33,6 +33,7 @@ from identify.selection.changes import (
     reshaped_of,
 )
 from identify.selection.controls import ControlTest
+from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -191,6 +192,8 @@ def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1
     if found.score and (found.supported or found.is_of_position):
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
+    if found.supported and change.effect.delays and is_of_friction(judged, after):
+        found = replace(found, doubt=IS_FRICTION)
     return Tried(change, screening, after, found)
 
 

@@ -135,7 +135,8 @@ def axis_with(verdict: Verdict, bic: float = 1.0, ratio: float = 2.0):
 
 
 def leading(**axes) -> str:
-    found = workflow.Diagnosis(made.MODEL, axes, made.Comparison(made.MODEL, {}), {})
+    compared = made.Comparison(made.MODEL, {})
+    found = workflow.Diagnosis(made.MODEL, axes, compared, {}, model=made.MODEL)
     return next(name for name, d in axes.items() if d is found.leading)
 
 
@@ -180,7 +181,4 @@ def test_the_model_of_a_diagnosis_has_what_was_found_as_it_was_fitted(case):
     assert (step.fit_error_before, step.fit_error_after) == (case.x.base.error, case.x.final.error)
     labels = {e.label for e in case.diagnosis.summaries["x"].after if e.low is not None}
     assert made_of_it.intervals["x"].ends.keys() == labels
-    nothing = case.diagnosis.__class__(
-        case.diagnosis.fitted, {"x": case.quiet}, case.diagnosis.comparison, {}
-    )
-    assert nothing.model is case.diagnosis.fitted
+    assert case.concluding(case.quiet).model is case.diagnosis.fitted

@@ -91,18 +91,23 @@ def _tiles(view: AxisView, found: AxisDiagnosis, summary: AxisSummary) -> list[T
     noise = DisplayUnit.of(unit, base.error)
     of = f"training logs; floor {noise.text(floor)} RMS"
     tiles.append(Tile("Error over noise floor", ratio, of))
-    return [*tiles, *_position_tile(view, f", without {view.label}" if view.label else "")]
+    return [*tiles, *_position_tile(view)]
 
 
 def _fall(before: float, after: float, unit: str) -> str:
     return quantity(before, unit) if after == before else arrow(before, after, unit)
 
 
-def _position_tile(view: AxisView, model: str) -> list[Tile]:
-    if not view.axis.position_error:
+def _position_tile(view: AxisView) -> list[Tile]:
+    """The free run of the worst log, without what was found and with it."""
+    before, after = view.axis.position_error, view.free_runs
+    if not before:
         return []
-    worst = quantity(max(view.axis.position_error.values()), view.units.position)
-    return [Tile(view.words("Position, free run"), worst, f"RMS of the worst log{model}")]
+    worst, unit = max(before, key=before.__getitem__), view.units.position
+    which = "with" if worst in after else "without"
+    remark = f"{which} {view.label}, " if view.label else ""
+    error = _fall(before[worst], after.get(worst, before[worst]), unit)
+    return [Tile(view.words("Position, free run"), error, f"{remark}RMS of the worst log")]
 
 
 def _compared(view: AxisView) -> AnswerBlock:
@@ -121,7 +126,7 @@ def _compared(view: AxisView) -> AnswerBlock:
         tiles=[
             Tile(view.words("Force error"), error, "RMS over the logs"),
             Tile("Error over noise floor", ratio, f"floor {floor} RMS"),
-            *_position_tile(view, ""),
+            *_position_tile(view),
         ],
         remarks=[],
         tone=tone,

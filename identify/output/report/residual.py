@@ -189,7 +189,8 @@ def _of_all_logs(view: AxisView, errors: Sequence[LogErrors]) -> TableBlock:
     axis, words = view.axis, view.words
     sizes = [size for e in errors for size in (e.before, e.after)]
     force = DisplayUnit.of(view.units.force, sizes)
-    position = DisplayUnit.of(view.units.position, list(axis.position_error.values()))
+    runs, better = axis.position_error, view.free_runs
+    position = DisplayUnit.of(view.units.position, [*runs.values(), *better.values()])
     without = f", without {view.label}" if view.label else ""
     columns: dict[str, Callable[[LogErrors], str]] = {
         "Log": lambda e: e.name,
@@ -200,12 +201,13 @@ def _of_all_logs(view: AxisView, errors: Sequence[LogErrors]) -> TableBlock:
     if view.label:
         columns[words(f"With {view.label}")] = lambda e: force.text(e.after)
     columns["Times noise floor"] = lambda e: number(e.after / e.floor)
-    runs = axis.position_error
-    columns[words("Position, free run")] = lambda e: position.text(runs.get(e.name))
+    columns[words(f"Position, free run{without}")] = lambda e: position.text(runs.get(e.name))
+    if better:
+        columns[f"Free run with {view.label}"] = lambda e: position.text(better.get(e.name))
     columns["Expected from noise"] = lambda e: position.text(axis.position_floor.get(e.name))
     caption = (
-        f"RMS. The free run, of training logs alone{without}, restarts from the measured motion "
-        f"every {HORIZON:g} s; between restarts the position drifts with every wrong force, "
-        "measurement noise included."
+        "RMS. The free run, of training logs alone, restarts from the measured motion every "
+        f"{HORIZON:g} s; between restarts the position drifts with every wrong force, measurement "
+        "noise included."
     )
     return TableBlock.of(errors, columns, words(caption))

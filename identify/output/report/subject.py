@@ -124,6 +124,13 @@ class AxisView:
         return all_found(self.found) if self.found else ""
 
     @property
+    def free_runs(self) -> Mapping[str, float]:
+        """Free-running position error with all that was found, log -> m RMS; none of nothing."""
+        result = self.subject.result
+        runs = result.free_runs if isinstance(result, Diagnosis) and self.label else {}
+        return runs.get(self.name, {})
+
+    @property
     def floors(self) -> Mapping[Role, float]:
         """The noise floors by role of logs, N RMS."""
         return self.summary.floors if self.summary else {Role.TRAINING: self.axis.floor}

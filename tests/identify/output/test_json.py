@@ -137,7 +137,7 @@ def test_an_object_is_as_it_was_read_and_as_the_schema_says(name: str) -> None:
 
 def test_the_text_of_a_mujoco_file_is_told_where_a_body_is_another_alone() -> None:
     model = replace(made.MODEL, mjcf="<mujoco/>", mjcf_name="arm.xml")
-    told = json_of(replace(made.diagnosed(), fitted=model))
+    told = json_of(replace(made.diagnosed(), fitted=model, model=model))
     assert 'mujoco = "arm.xml"' in told["model"]
     assert told["mujoco"] is None
 

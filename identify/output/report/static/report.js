@@ -38,7 +38,7 @@ function plot(place, options, values) {
   const u = new uPlot({
     width: Math.max(place.clientWidth, 200), pxAlign: false, ...options, series: [options.x, ...options.series],
     scales: {x: {time: false}, ...options.scales},
-    axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null}), ...(options.days ? {values: options.days} : {})}), axis(options.labels[1], {size: 62})],
+    axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null}), ...(options.days ? {values: options.days} : {})}), axis(options.labels[1], {size: 62, ...(options.scales?.y?.distr ? {values: (u, at) => at.map(v => v == null ? "" : digits(v))} : {})})],
   }, values, place);
   if (!place.watch) {
     place.watch = new ResizeObserver(() => place.shown.setSize({width: Math.max(place.clientWidth, 200), height: place.shown.height}));
@@ -332,12 +332,15 @@ for (const place of document.querySelectorAll("[data-chart]")) {
     line: {}, dash: {dash: [7, 5]}, steps: {paths: uPlot.paths.stepped({align: 1, alignGaps: 1})},
     stems: {paths: uPlot.paths.bars({size: [0.15, 8, 2], align: 0}), fill: BEFORE},
   };
+  const other = Object.fromEntries(spec.bands), upper = new Set(Object.values(other));  // of each lower edge its upper
+  const edges = (u, v, of, i) => v == null ? "–" : `${digits(v)} to ${digits(u.data[other[of]][i])}`;
   const log = on => on ? {distr: 3} : {}, day = v => v == null ? "–" : new Date(v * 1e3).toISOString().slice(0, 10);
   plot(place, {
     height: 240, labels: [spec.x.label, spec.y.label], x: {label: spec.x.label, value: (u, v) => spec.x.dates ? day(v) : digits(v)},
     ...(spec.x.dates ? {days: (u, at) => at.map(v => day(v).slice(5))} : {}), tzDate: v => uPlot.tzDate(new Date(v * 1e3), "Etc/UTC"),
     scales: {x: {time: !!spec.x.dates, ...log(spec.x.log)}, y: log(spec.y.log)}, bands: spec.bands.map(b => ({series: b, fill: "rgba(47,109,179,.18)"})),
-    series: spec.series.map(s => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind], width: s.kind === "band" ? 0.5 : 1.5})),
+    series: spec.series.map((s, i) => line(s.label, {before: BEFORE, after: AFTER, ink: INK, soft: MEASURED}[s.color], "", {...kinds[s.kind],
+      ...(s.kind === "band" ? {width: 0.5, class: upper.has(i + 1) ? "edge" : null, value: edges} : {width: 1.5})})),
     cursor: {drag: {x: true, y: false}},
   }, [spec.x.values, ...spec.series.map(s => s.values)]);
 }
