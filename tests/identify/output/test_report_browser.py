@@ -14,6 +14,8 @@ from browser import Browser, browser
 from report_cases import Case
 
 from identify import workflow
+from identify.output.report.page import Chart, Drawn, Line, Section
+from identify.output.report.page import page as whole_page
 from twin.effects import Catalogue, load_catalogue
 from twin.model.machine import Fitted
 from twin.simulation.simulate import simulate
@@ -155,6 +157,23 @@ def test_the_map_tells_the_error_of_a_cell(page: Browser) -> None:
     pattern = r"Cogging phase [−\d.]+ mm, speed [−\d.]+ mm/s: [\d.]+ mN RMS, \d+ test functions"
     assert all(re.fullmatch(pattern, one) for one in said[0])
     assert said[1].startswith("RMS of all logs: from the noise floor")
+
+
+def test_a_band_has_one_entry_and_small_values_a_scale(shown: tuple[Browser, Path]) -> None:
+    """Beside each band its name stood twice, and below 0.001 the scale said 0."""
+    running, file = shown
+    along, size = np.array([1.0, 10.0, 100.0]), np.array([1e-5, 1e-4, 1e-3])
+    edges = [Drawn("band", factor * size, Line.BAND) for factor in (0.5, 2.0)]
+    chart = Chart(("f (Hz)", along), "F (N)", [*edges, Drawn("F", size)], log_x=True, log_y=True)
+    text = whole_page("bands", (), [Section("one", "One", [chart])], (), ())
+    (file.parent / "bands.html").write_text(text, encoding="utf-8")
+    running.open(file.parent / "bands.html")
+    told = running.run("""const place = document.querySelector("[data-chart]"), u = place.shown;
+      const rows = [...place.querySelectorAll(".u-series")].filter(row => row.offsetParent);
+      return [rows.map(row => row.querySelector(".u-label").textContent),
+        u.axes[1].values(u, [1e-5, null]), u.series[1].value(u, 5e-5, 1, 1)];""")
+    assert told == [["f (Hz)", "band", "F"], ["0.00001", ""], "0.00005 to 0.0002"]
+    assert running.errors == []
 
 
 def test_a_narrow_page_fits_its_texts_have_contrast_and_its_controls_names(
