@@ -93,6 +93,9 @@ class _Times:
         return f'{{column = {column}, unit = "{self.unit}"}}'
 
 
+_BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
+
+
 def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     """The time base of a table; columns: those of numbers (n,), all as long."""
     if table.sample_rate is not None:
@@ -108,6 +111,9 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     if found:
         return _of_times(found, columns, stated, used)
     if stated is not None and stated.rate is not None:
+        for name in counters[:1]:
+            if _count_of(columns[name]).lost:
+                return _counted(name, columns[name], stated, used)
         line = f"sample_rate = {stated.rate:.9g} # Hz: the file states {stated.text!r}"
         return Clock((line,), 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
@@ -288,18 +294,15 @@ def _asked(
     unit = "" if stated is None else f"; the file states {stated.text!r} without a unit"
     lines = []
     for name in counters[:1]:
-        steps = np.diff(_continued(columns[name]))
-        lost = int(np.sum(np.maximum(steps / np.median(steps) - 1.0, 0.0)))
-        gap = f" and lacks {lost} of them, the first {_lost(columns[name])}" if lost else ""
-        many = "" if np.median(steps) == 1.0 else f", {np.median(steps):g} at a time"
-        why = f"'{name}' counts the {'samples' if lost else 'rows'}{many}{gap}"
-        if lost or many:
+        count = _count_of(columns[name])
+        why = count.told(name)
+        if count.lost or count.by != 1.0:
             column = json.dumps(name, ensure_ascii=False)
             lines = [
                 f"# time = {{column = {column}, step = ?}} # s a count: NOT KNOWN, {why}{unit}"
             ]
-            if lost:
-                lines.append("# resample = ? # Hz: what is lost is bridged by straight lines")
+            if count.lost:
+                lines.append(_BRIDGED)
             said = f"{why}{unit}; give step (s a count): time = {{column = {column}, step = ...}}"
             return Clock(tuple(lines), NOMINAL, used, (said,))
         break
@@ -309,9 +312,35 @@ def _asked(
     return Clock((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
 
 
-def _lost(column: Array) -> str:
-    """The first numbers that a counter lacks."""
-    steps = np.diff(column)
-    k = int(np.argmax(steps > np.median(steps)))
+def _counted(name: str, column: Array, stated: StatedRate, used: tuple[str, ...]) -> Clock:
+    """The time base of a counter that lacks samples, of which the file states the rate."""
+    assert stated.rate is not None
+    count = _count_of(column)
+    step, quoted = 1.0 / (stated.rate * count.by), json.dumps(name, ensure_ascii=False)
+    why = f"{count.told(name)}; the file states {stated.text!r}"
+    line = f"time = {{column = {quoted}, step = {step:.9g}}} # s a count: {why}"
+    return Clock((line, _BRIDGED), 1.0 / stated.rate, used)
+
+
+@dataclass(frozen=True)
+class _Count:
+    """What a counter of samples counts: how many at a time, how many it lacks, the first of them."""
+
+    by: float
+    lost: int
+    first: str
+
+    def told(self, name: str) -> str:
+        """In words."""
+        gap = f" and lacks {self.lost} of them, the first {self.first}" if self.lost else ""
+        many = "" if self.by == 1.0 else f", {self.by:g} at a time"
+        return f"'{name}' counts the {'samples' if self.lost else 'rows'}{many}{gap}"
+
+
+def _count_of(column: Array) -> _Count:
+    steps = np.diff(_continued(column))
+    by = float(np.median(steps))
+    lost = int(np.sum(np.maximum(steps / by - 1.0, 0.0)))
+    k = int(np.argmax(np.diff(column) > by))
     first, last = column[k] + 1, column[k + 1] - 1
-    return f"{first:g}" if first == last else f"{first:g} to {last:g}"
+    return _Count(by, lost, f"{first:g}" if first == last else f"{first:g} to {last:g}")

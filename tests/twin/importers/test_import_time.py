@@ -183,6 +183,18 @@ def test_a_counter_with_gaps_asks_for_its_step_and_no_number_is_in_the_map(tmp_p
         mapping(tmp_path, text.replace("step", 'unit = "s", step'))
 
 
+def test_a_counter_with_gaps_beside_a_rate_that_the_file_states_is_the_time(tmp_path):
+    """Its rate alone had put the parts together, 8 ms too short, without a word."""
+    number = np.delete(np.arange(COUNT + 2.0), [200, 201])
+    write_csv(tmp_path / "b.csv", {"n": number, "pos_mm": Q, "force_N": F})
+    (tmp_path / "a.csv").write_text("# rate: 250 Hz\n" + (tmp_path / "b.csv").read_text())
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    line = found.text.splitlines()[1]
+    assert line.startswith('time = {column = "n", step = 0.004} # s a count: ')
+    assert "lacks 2 of them, the first 200 to 201; the file states '# rate: 250 Hz'" in line
+
+
 def test_times_are_found_by_their_unit_alone_with_repeats(tmp_path):
     late = np.insert(T, 100, T[99])
     columns = {"pos_mm": Q, "force_N": F}
