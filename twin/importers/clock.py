@@ -324,7 +324,7 @@ def _counted(name: str, column: Array, stated: StatedRate, used: tuple[str, ...]
 
 @dataclass(frozen=True)
 class _Count:
-    """What a counter of samples counts: how many at a time, how many it lacks, the first of them."""
+    """What a counter of samples counts: so many at a time; how many it lacks, the first of them."""
 
     by: float
     lost: int
