@@ -29,7 +29,7 @@ from identify.selection.candidates import NotItself, doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.of_bodies import is_of_bodies
 from identify.selection.of_friction import IS_FRICTION, is_of_friction
-from identify.selection.search import Found, Step
+from identify.selection.search import Found, Step, of_simplest_values
 from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
 from twin.curve import Coordinate
@@ -225,7 +225,9 @@ def _without(steps: Sequence[Step], found: Found) -> Judged:
     dataset = found.dataset
     begun = (axis, axis.begun_as(base), *_alike(axis, found.passed))
     fits = [fit_themselves(a, dataset.part.training) for a in begun]
-    less = replace(min(fits, key=lambda f: f.error), begun=found.final.fit.begun)
+    less = min(fits, key=lambda f: f.error)
+    less = of_simplest_values(less, [s for s in found.steps if s not in steps])
+    less = replace(less, begun=found.final.fit.begun)
     if dataset.part is not dataset:
         less = finished(less.axis, less.begun, dataset.training, less.outcome)
     return Judged(less, dataset)

@@ -231,13 +231,18 @@ def _without_delay(judged: Judged, trial: Beside, progress: Progress) -> Judged:
 
 def _in_simplest_values(judged: Judged, steps: tuple[Step, ...]) -> Judged:
     """The fit with the simplest values of what was added, which later steps may have cleared."""
-    fit = judged.fit
-    added = {s.change.name for s in steps if isinstance(s.change, Added)}
-    for law in (f for f in judged.fit.axis.effects if f.effect.name in added):
-        fit = in_simplest_values(fit, law.effect)
+    fit = of_simplest_values(judged.fit, steps)
     if fit is judged.fit:
         return judged
     return Judged(replace(fit, begun=judged.fit.begun), judged.dataset)
+
+
+def of_simplest_values(fit: Fit, steps: Sequence[Step]) -> Fit:
+    """A fit with the simplest values of what some steps added, where they explain as much."""
+    added = {s.change.name for s in steps if isinstance(s.change, Added)}
+    for law in (f for f in fit.axis.effects if f.effect.name in added):
+        fit = in_simplest_values(fit, law.effect)
+    return fit
 
 
 def _with_free_exponents(
