@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 
+from benchmarks.drives import CATALOGUE, HIDDEN
+from benchmarks.second_simulator.drives import DRIVES, Recorder, log_of
+from identify import diagnose
+from identify.analysis.first_model import first_model
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 
 KNOWN = few("cogging", "spring", "quadratic_drag")
@@ -59,3 +63,14 @@ def test_what_one_log_does_not_propose_and_both_prove_is_named_whichever_log_cho
     two = {"two": logged(true, Ride(13, 6.0), sticky)}
     for pair in ((one, two), (two, one)):
         assert diagnose_axis(*begun(SLIDE, *pair), KNOWN).named == ("cogging",)
+
+
+@pytest.mark.slow
+def test_what_a_test_log_refuses_takes_no_other_law_with_it() -> None:
+    """Without the bristle a cogging had twice its period, and both were refused for that."""
+    drive, recorder = DRIVES["actuator"], Recorder(2000, 2000, mean=False, coarse=True)
+    plant = HIDDEN["two coggings"][0](drive, recorder)
+    one, other, test = (log_of(drive, plant, recorder, 3 * 70039 + i) for i in range(3))
+    model = first_model({"one": one}, "drive", CATALOGUE)
+    found = diagnose(model, other, one, test, catalogue=CATALOGUE).axes["q"]
+    assert {"cogging", "cogging_2"} <= set(found.named)
