@@ -52,7 +52,7 @@ def row(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
     drive, (change, _) = DRIVES[name], HIDDEN[hidden]
     plant = change(drive, recorder)
     one, other, test = (log_of(drive, plant, recorder, 3 * seed + i) for i in range(3))
-    model = first_model({"one": one}, name, CATALOGUE)
+    model = first_model({"one": one, "other": other}, name, CATALOGUE)
     found = [
         diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"]
         for pair in ((one, other), (other, one))
