@@ -109,8 +109,6 @@ class Comparison(Pictured):
     """The errors of a model on logs, by axis.
 
     recording: how the logs of a mechanism are another than its file needs; all is of them so read.
-    model: with everything that was found, fitted together, and how its errors fell. free_runs: its
-    free-running position error, axis -> training log -> m RMS; none where nothing was found.
     """
 
     model: MachineModel
@@ -242,6 +240,8 @@ class Diagnosis(Pictured):
     with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not
     that of its file, the one that explains most first; the diagnoses are with them as found.
     recording: how the logs of a mechanism are another than its file needs; all is of them so read.
+    model: with everything that was found, fitted together, and how its errors fell. free_runs: its
+    free-running position error, axis -> training log -> m RMS; none where nothing was found.
     """
 
     fitted: MachineModel

@@ -21,7 +21,7 @@ from twin.model.machine import AxisModel
 from twin.signals import Array, rate
 
 IS_FRICTION = NotItself("the friction alone, a moment earlier or later, explains as much")
-NEARLY = 0.95  # of the part of that law, as two rates are nearly the friction out of step
+AS_MUCH = 0.95  # of the part of that law, as two rates are nearly the friction out of step
 
 
 def is_of_friction(less: Judged, final: Judged) -> bool:
@@ -40,7 +40,7 @@ def is_of_friction(less: Judged, final: Judged) -> bool:
 
     own = with_unit_penalty(columns, less.fit)
     alone = ControlTest.beside(less).part(own, sticking=sticks(axis))
-    return alone >= NEARLY * score(less, final).part
+    return alone >= AS_MUCH * score(less, final).part
 
 
 def _rates(force: Array, period: float) -> Array:

@@ -43,6 +43,7 @@ _UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": 
                "s": "s"}  # fmt: skip
 _SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _OFF = 0.02  # of a rate or a time, by which two clocks that are one do not differ
+_BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
 NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
 
 
@@ -91,9 +92,6 @@ class _Times:
         """Its entry in a map."""
         column = json.dumps(self.name, ensure_ascii=False)
         return f'{{column = {column}, unit = "{self.unit}"}}'
-
-
-_BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
 
 
 def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
@@ -295,7 +293,7 @@ def _asked(
     lines = []
     for name in counters[:1]:
         count = _count_of(columns[name])
-        why = count.told(name)
+        why = count.why(name)
         if count.lost or count.by != 1.0:
             column = json.dumps(name, ensure_ascii=False)
             lines = [
@@ -317,7 +315,7 @@ def _counted(name: str, column: Array, stated: StatedRate, used: tuple[str, ...]
     assert stated.rate is not None
     count = _count_of(column)
     step, quoted = 1.0 / (stated.rate * count.by), json.dumps(name, ensure_ascii=False)
-    why = f"{count.told(name)}; the file states {stated.text!r}"
+    why = f"{count.why(name)}; the file states {stated.text!r}"
     line = f"time = {{column = {quoted}, step = {step:.9g}}} # s a count: {why}"
     return Clock((line, _BRIDGED), 1.0 / stated.rate, used)
 
@@ -330,8 +328,8 @@ class _Count:
     lost: int
     first: str
 
-    def told(self, name: str) -> str:
-        """In words."""
+    def why(self, name: str) -> str:
+        """Why a column of that name is the time, in words."""
         gap = f" and lacks {self.lost} of them, the first {self.first}" if self.lost else ""
         many = "" if self.by == 1.0 else f", {self.by:g} at a time"
         return f"'{name}' counts the {'samples' if self.lost else 'rows'}{many}{gap}"
