@@ -158,17 +158,16 @@ def test_a_mass_that_no_motion_told_is_nobodys_place():
     assert found.refused is None
 
 
-@pytest.mark.short(1)
-@pytest.mark.parametrize(("early", "late"), [(True, False), (False, True)])
-def test_a_friction_out_of_step_is_no_late_motor(early, late):
-    """A soft friction, as simulators make it, is ahead of its speed: a lag of 9 ms, with 98 %."""
-    known, light = few("actuator_lag", "actuator_delay"), replace(SLIDE, mass=0.05)
-    true = light if early else having(replace(SLIDE, mass=1.0), "actuator_delay", tau=0.003)
+def test_a_friction_out_of_step_is_no_late_motor():
+    """A soft friction, as simulators make it, is ahead of its speed: a lag of 9 ms, with 98 %.
+
+    That a late motor is one still is in ``test_ties``.
+    """
+    light = replace(SLIDE, mass=0.05)
 
     def rubbed(_: Array, speed: Array) -> Array:
-        ahead = speed + 0.003 * RATE * np.gradient(speed)
-        return -2.0 * np.tanh((ahead if early else speed) / 0.05)
+        return -2.0 * np.tanh((speed + 0.003 * RATE * np.gradient(speed)) / 0.05)
 
-    found = asked(replace(light, mass=true.mass), true, known, rubbed, SHORT)
-    assert any(f.kind is FindingKind.WRONG_SHAPE for f in found.findings)
-    assert any("actuator_delay" in names for names in found.answers) == late
+    found = asked(light, light, few("actuator_lag", "actuator_delay"), rubbed, SHORT)
+    (finding,) = found.findings
+    assert (finding.effect, finding.kind) == ("coulomb_viscous", FindingKind.WRONG_SHAPE)
