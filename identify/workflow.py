@@ -49,7 +49,13 @@ from identify.results.results import (
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.nonparametric import physics_alone
 from identify.validation.agreement import Agreement, agreement
-from identify.validation.comparison import SideBySide, compare_axis, position_errors, side_by_side
+from identify.validation.comparison import (
+    SideBySide,
+    compare_axis,
+    free_run_errors,
+    position_errors,
+    side_by_side,
+)
 from identify.validation.misfit_maps import worst_region
 from identify.validation.tracking import tracking, unmoved
 from twin.effect import Effect
@@ -289,19 +295,18 @@ def diagnose(
     axes = dict(zip(away.fits, spread(partial(diagnosed, away), away.fits), strict=True))
     away, anew = away.asked_again(axes, progress)
     axes |= zip(anew, spread(partial(diagnosed, away), anew), strict=True)
-    bodies = away.bodies_beside(
-        {axis: d.final for axis, d in axes.items()}, {axis: d.dataset for axis, d in axes.items()}
-    )
+    ends = {axis: d.final for axis, d in axes.items()}
+    bodies = away.bodies_beside(ends, {axis: d.dataset for axis, d in axes.items()})
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
-    for d in axes.values():
-        d.final.forget()  # it is the last that asked for the matrices of all logs
+    for final in ends.values():
+        final.forget()  # it is the last that asked for the matrices of all logs
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
     better = with_all_found(model, axes, summaries, bodies)
-    run = partial(position_errors, progress=partial(progress, "comparing with all that was found"))
+    comparing = partial(progress, "comparing with all that was found")
     return Diagnosis(
         fitted=model,
         axes=axes,
@@ -315,7 +320,7 @@ def diagnose(
         bodies=bodies,
         recording=given.recording,
         model=better,
-        free_runs={} if better is model else run(better, prepared)[0],
+        free_runs={} if better is model else free_run_errors(better, prepared, comparing),
     )
 
 

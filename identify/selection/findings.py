@@ -306,7 +306,7 @@ def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
         return NotItself(
             "another rotor, or bodies with values within a tenth of the file's, explain as much"
         )
-    if own is None and change.effect.delays and is_of_friction(less, final):
+    if own is None and is_of_friction(less, final, change.effect):
         return IS_FRICTION
     return own
 

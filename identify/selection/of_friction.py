@@ -16,7 +16,7 @@ from identify.estimation.force_balance import averaged_force
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import NotItself
 from identify.selection.controls import ControlTest, with_unit_penalty
-from twin.effect import RUBBING
+from twin.effect import RUBBING, Effect
 from twin.model.machine import AxisModel
 from twin.signals import Array, rate
 
@@ -24,15 +24,15 @@ IS_FRICTION = NotItself("the friction alone, a moment earlier or later, explains
 AS_MUCH = 0.95  # of the part of that law, as two rates are nearly the friction out of step
 
 
-def is_of_friction(less: Judged, final: Judged) -> bool:
-    """Whether a friction out of step takes as much as a law does that delays every force.
+def is_of_friction(less: Judged, final: Judged, effect: Effect) -> bool:
+    """Whether a friction out of step takes as much as a law does; of one that delays every force.
 
     less, final: the fits without that law and with it. What is out of step by little is by its rate
     and by the rate of that (Taylor); of the friction that the fit with the law has, as the other is
     not to be mistaken for its shape. Where all of the force is late, that of friction takes less.
     """
     rubbing, axis = _rubbing(final.fit.axis), less.fit.axis
-    if not rubbing.effects:
+    if not effect.delays or not rubbing.effects:
         return False
 
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:

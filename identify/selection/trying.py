@@ -192,7 +192,7 @@ def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1
     if found.score and (found.supported or found.is_of_position):
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
-    if found.supported and change.effect.delays and is_of_friction(judged, after):
+    if found.supported and is_of_friction(judged, after, change.effect):
         found = replace(found, doubt=IS_FRICTION)
     return Tried(change, screening, after, found)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,9 @@ from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import spread
 from twin.signals import Array
+
+Parts = Mapping[str, PreparedLog]  # of one log, by axis
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,23 +152,53 @@ def position_errors(
 
     There is none where the motion is imposed, and of a log on whose command the model runs away.
     """
+
+    def both(parts: Parts) -> dict[str, tuple[float, float]]:
+        own = free_run(model, parts)
+        noise = drift_of_noise(model, parts, own)
+        return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
+
+    every = _of_each_log(both, model, found, progress)
+    errors, floors = (
+        {axis: {name: pair[i] for name, pair in own.items()} for axis, own in every.items()}
+        for i in (0, 1)
+    )
+    return errors, floors
+
+
+def free_run_errors(
+    model: MachineModel, found: Mapping[str, Dataset], progress: Callable[[int, int], None]
+) -> dict[str, dict[str, float]]:
+    """The first of these alone, without the runs of noise."""
+
+    def error(parts: Parts) -> dict[str, float]:
+        own = free_run(model, parts)
+        return {axis: rms_error(own, axis) for axis in parts}
+
+    return _of_each_log(error, model, found, progress)
+
+
+def _of_each_log(
+    errors: Callable[[Parts], Mapping[str, T]],
+    model: MachineModel,
+    found: Mapping[str, Dataset],
+    progress: Callable[[int, int], None],
+) -> dict[str, dict[str, T]]:
+    """What free runs on each log tell of its axes: axis -> log; nothing where there is no run."""
     logs = {} if model.is_imposed else by_log(found)
     if model.joints:  # whose motion asks for the torques of all
         logs = {name: parts for name, parts in logs.items() if len(parts) == len(model.axes)}
 
-    def run(parts: Mapping[str, PreparedLog]) -> dict[str, tuple[float, float]]:
+    def run(parts: Parts) -> Mapping[str, T]:
         with left_out_if_it_cannot_run(next(iter(parts.values())).motion.name):
-            own = free_run(model, parts)
-            noise = drift_of_noise(model, parts, own)
-            return {axis: (rms_error(own, axis), rms_error(noise, axis)) for axis in parts}
+            return errors(parts)
         return {}
 
-    errors: dict[str, dict[str, float]] = {a: {} for a in found}
-    floors: dict[str, dict[str, float]] = {a: {} for a in found}
+    out: dict[str, dict[str, T]] = {a: {} for a in found}
     for name, by_axis in zip(logs, spread(run, logs.values(), progress), strict=True):
-        for axis, both in by_axis.items():
-            errors[axis][name], floors[axis][name] = both
-    return errors, floors
+        for axis, own in by_axis.items():
+            out[axis][name] = own
+    return out
 
 
 @dataclass(frozen=True, eq=False)

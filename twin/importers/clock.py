@@ -109,11 +109,8 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
     if found:
         return _of_times(found, columns, stated, used)
     if stated is not None and stated.rate is not None:
-        for name in counters[:1]:
-            if _count_of(columns[name]).lost:
-                return _counted(name, columns[name], stated, used)
-        line = f"sample_rate = {stated.rate:.9g} # Hz: the file states {stated.text!r}"
-        return Clock((line,), 1.0 / stated.rate, used)
+        lines = _of_rate(columns, counters, stated.rate, f"the file states {stated.text!r}")
+        return Clock(lines, 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
 
 
@@ -310,14 +307,17 @@ def _asked(
     return Clock((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
 
 
-def _counted(name: str, column: Array, stated: StatedRate, used: tuple[str, ...]) -> Clock:
-    """The time base of a counter that lacks samples, of which the file states the rate."""
-    assert stated.rate is not None
-    count = _count_of(column)
-    step, quoted = 1.0 / (stated.rate * count.by), json.dumps(name, ensure_ascii=False)
-    why = f"{count.why(name)}; the file states {stated.text!r}"
-    line = f"time = {{column = {quoted}, step = {step:.9g}}} # s a count: {why}"
-    return Clock((line, _BRIDGED), 1.0 / stated.rate, used)
+def _of_rate(
+    columns: Mapping[str, Array], counters: Sequence[str], rate: float, why: str
+) -> tuple[str, ...]:
+    """The lines of a rate (Hz) that a file states: of its counter, where that lacks samples."""
+    for name in counters[:1]:
+        count = _count_of(columns[name])
+        if count.lost:
+            column, step = json.dumps(name, ensure_ascii=False), 1.0 / (rate * count.by)
+            line = f"time = {{column = {column}, step = {step:.9g}}} # s a count: {count.why(name)}"
+            return f"{line}; {why}", _BRIDGED
+    return (f"sample_rate = {rate:.9g} # Hz: {why}",)
 
 
 @dataclass(frozen=True)
