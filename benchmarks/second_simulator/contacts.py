@@ -28,7 +28,8 @@ class Contact:
 
     kind: which law. noise: m rms, of a reading. slip: m/s, Stribeck speed. damping: N s/m, of the
     bristle. loop: rad/s. rate: Hz. shares, springs (SLIPS,): parts of the force and of the
-    stiffness of the elements.
+    stiffness of the elements. asymmetry: part by which Fc and Fs of a bristle are larger upwards
+    than in the mean. weight: N, against the position, which the controller knows.
     """
 
     kind: str
@@ -44,6 +45,8 @@ class Contact:
     rate: float
     shares: tuple[float, ...]
     springs: tuple[float, ...]
+    asymmetry: float = 0.0
+    weight: float = 0.0
 
 
 def drawn(kind: str, noise: float, rng: np.random.Generator) -> Contact:
@@ -76,7 +79,7 @@ def log_of(contact: Contact, rng: np.random.Generator) -> Log:
     kind = KINDS.index(contact.kind)
     values = np.array([
         contact.mass, contact.coulomb, contact.static, contact.stiffness, contact.slip,
-        contact.damping, contact.viscous, contact.loop,
+        contact.damping, contact.viscous, contact.loop, contact.asymmetry, contact.weight,
     ])  # fmt: skip
     read, command = _simulate(
         kind, values, np.array(contact.shares), np.array(contact.springs), path,
@@ -102,7 +105,7 @@ def _moves(rate: float, rng: np.random.Generator) -> np.ndarray:
 @numba.njit(cache=True)
 def _simulate(kind, values, shares, springs, path, speed, noise, period):  # pragma: no cover
     """Readings m and commands N, a sample each; the command is held over the sample."""
-    mass, coulomb, static, stiffness, slip, damping, viscous, loop = values
+    mass, coulomb, static, stiffness, slip, damping, viscous, loop, asymmetry, weight = values
     read, command = np.zeros(len(path)), np.zeros(len(path))
     x, v, z, h = path[0], 0.0, 0.0, period / STEPS
     f, seen, last = np.zeros(len(shares)), 0.0, path[0]
@@ -110,12 +113,14 @@ def _simulate(kind, values, shares, springs, path, speed, noise, period):  # pra
         read[k] = x + noise[k]
         seen += LOWPASS * ((read[k] - last) / period - seen)
         last = read[k]
-        command[k] = mass * loop * (loop * (path[k] - read[k]) + 1.2 * (speed[k] - seen))
+        wanted = loop * (path[k] - read[k]) + 1.2 * (speed[k] - seen)
+        command[k] = mass * loop * wanted + weight
         for _ in range(STEPS):
             g = coulomb + (static - coulomb) * np.exp(-((v / slip) ** 2))
             force = viscous * v
             if kind <= 1:  # LuGre, Dahl
                 way = 1.0 if v > 0.0 else -1.0
+                g *= 1.0 + way * asymmetry
                 change = (way * g / stiffness - z) * -np.expm1(-stiffness * abs(v) * h / g)
                 z += change
                 force += stiffness * z + damping * change / h
@@ -124,6 +129,6 @@ def _simulate(kind, values, shares, springs, path, speed, noise, period):  # pra
                     most = shares[i] * g
                     f[i] = min(max(f[i] + stiffness * springs[i] * v * h, -most), most)
                     force += f[i]
-            v += h * (command[k] - force) / mass
+            v += h * (command[k] - force - weight) / mass
             x += h * v
     return read, command

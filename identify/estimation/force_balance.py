@@ -33,7 +33,6 @@ from identify.dataset.prepared_log import (
 )
 from identify.dataset.test_function import SHORTEST
 from identify.dataset.time_scale import QUIET
-from identify.estimation.evidence import rms
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.settling import settle
@@ -164,7 +163,8 @@ def settled(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[PreparedLog]:
 
     def one(log: PreparedLog) -> PreparedLog:
         motion = log.motion
-        matters = motion.slip is None and force > QUIET * rms(motion.net)
+        # what changes: a weight that the motor holds says nothing of how fine its force is
+        matters = motion.slip is None and force > QUIET * float(np.std(motion.net))
         return _settled(own, log) if matters else log
 
     return spread(one, logs)

@@ -264,7 +264,7 @@ class Table:
     labels: tuple[tuple[str, str], ...]
     """(axis name, effect name) of each entry."""
     remembers: NDArray[np.bool_]
-    """(n,) which laws remember the path."""
+    """(n,) which laws follow the path: what remembers it, and what modifies such a friction."""
     reads_joints: bool = False
     """Whether a law reads the load or the velocities of a mechanism's joints."""
 
@@ -284,10 +284,11 @@ def build_table(
         n_states += 4  # of the axis itself, before those of its effects
         begin = len(rows)
         sensing = begin
+        bristles = any(e.remembers for e, _ in effects if e.kind is Kind.FRICTION)
         for effect, values in sorted(effects, key=lambda e: e[0].turn):
             rows.append((law_address(effect), effect.kind.value, len(parameters), n_states))
             labels.append((axis, effect.name))
-            remembers.append(effect.remembers)
+            remembers.append(effect.remembers or (bristles and effect.kind is Kind.MODIFIER))
             parameters.extend(values)
             n_states += len(effect.states)
             sensing += effect.kind is Kind.SENSING

@@ -14,17 +14,22 @@ from twin.model.machine import AxisModel, Fitted, MachineModel
 STIFFNESS, LEVEL, MASS, REACH = 2e6, 8.0, 5.0, 4e-6  # N/m, N, kg, m
 
 
-def logged(noise):
-    """Moves with rests of a mass on a contact of 4 um, whose readings have noise, m rms."""
+def logged(noise, asymmetry=0.0, weight=0.0):
+    """Moves with rests of a mass on a contact of 4 um, whose readings have noise, m rms.
+
+    asymmetry: of the friction; weight: N, that the motor holds.
+    """
     contact = Contact(
-        DAHL, MASS, LEVEL, LEVEL, STIFFNESS, 0.01, 0.0, 0.0, noise, 90.0, 1000.0, (1.0,), (1.0,)
-    )
+        DAHL, MASS, LEVEL, LEVEL, STIFFNESS, 0.01, 0.0, 0.0, noise, 90.0, 1000.0, (1.0,), (1.0,),
+        asymmetry, weight,
+    )  # fmt: skip
     return {"run": log_of(contact, np.random.default_rng(3))}
 
 
-def dahl(stiffness):
-    own = Fitted.at_start(CATALOGUE["dahl"], {"Fc": LEVEL, "sigma2": 0.0, "sigma0": stiffness})
-    return MachineModel("m", {"q": AxisModel(MASS, effects=(own,))}, 1000.0)
+def dahl(stiffness, **beside):
+    values = {"dahl": {"Fc": LEVEL, "sigma2": 0.0, "sigma0": stiffness}, **beside}
+    own = tuple(Fitted.at_start(CATALOGUE[name], given) for name, given in values.items())
+    return MachineModel("m", {"q": AxisModel(MASS, effects=own)}, 1000.0)
 
 
 # Along the readings as they are 1.5, 3.6 and 3.3 N were left; the free run was 30 to 100 um off.
@@ -33,6 +38,23 @@ def test_the_true_values_leave_little_whatever_the_noise_of_the_readings(noise, 
     axis = compare(dahl(STIFFNESS), logged(noise), test_function=0.05).axes["q"]
     assert axis.total_error < most
     assert axis.position_error["run"] < 3e-5
+
+
+def left(model, *logs):
+    return compare(model, logged(*logs), test_function=0.05).axes["q"].total_error
+
+
+# A motor that holds 500 N beside 8 N of friction had nothing balanced at rest: 0.80 N were left.
+def test_a_weight_that_the_motor_holds_does_not_hide_what_the_contact_holds():
+    heavy = dahl(STIFFNESS, constant_force={"F0": -500.0})
+    assert left(heavy, 1e-7, 0.0, 500.0) == pytest.approx(left(dahl(STIFFNESS), 1e-7), rel=0.1)
+
+
+# By the direction of each reading 0.33 and 0.67 N were left.
+@pytest.mark.parametrize("noise", [1e-8, 1e-7])
+def test_what_modifies_a_friction_follows_its_path(noise):
+    asymmetric = dahl(STIFFNESS, asymmetric_friction={"coulomb": 0.3, "viscous": 0.0})
+    assert left(asymmetric, noise, 0.3) < 1.3 * left(dahl(STIFFNESS), noise)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-8, 5e-7])
