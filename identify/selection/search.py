@@ -24,6 +24,7 @@ from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, prefers, score
+from identify.selection.beside_kin import pairs_beside
 from identify.selection.candidates import Candidate, candidate_of, ordered
 from identify.selection.changes import (
     Added,
@@ -190,7 +191,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
         if not (new := _accepted(judged, last)):
             exchanged = tried_exchanged(judged, trial, step)
             new = _accepted(judged, exchanged) or _together(judged, last, trial, step)
-            new = new or _of_position([*last, *exchanged])
+            new = new or _beside_kin(judged, trial, step) or _of_position([*last, *exchanged])
         if not new:
             break
         exchanged = []
@@ -316,7 +317,8 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         lowering = _laws_for(best, judged, tried) or lowering
         best = _best_of(lowering)
     tied = [best, *(t for t in lowering if t is not best and is_tied(t, best))]
-    first = simplest(tied)
+    # A law leads a free curve that is no better: whatever is missing beside it bends the curve too.
+    first = simplest([t for t in tied if not isinstance(t.change, Reshaped)] or tied)
     kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
     others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
     return [Step(first, others, kin=alike)]
@@ -394,6 +396,18 @@ def _together(
             near = NEARLY * way.candidate.part
             level = tuple(t for t in ways if t is not way and t.candidate.part >= near)
             return [Step(way, level, with_others=True), replace(second, with_others=True)]
+    return []
+
+
+def _beside_kin(judged: Judged, trial: Beside, progress: Progress) -> list[Step]:
+    """Another friction with what modifies it, where the logs ask for both together."""
+    for pair in pairs_beside(judged, trial, progress):
+        both, change = pair.modifier.judged, pair.friction.change
+        axis = change.undone(both.fit.axis, judged.fit.axis)
+        if axis is None or score(judged, both).refused:
+            continue
+        if _is_needed(change, refitted_on(axis, both), both):
+            return [Step(pair.friction, with_others=True), Step(pair.modifier, with_others=True)]
     return []
 
 

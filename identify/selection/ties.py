@@ -15,6 +15,7 @@ from dataclasses import replace
 from identify.estimation.fit import fit_axis, fit_roughly
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
+from identify.selection.beside_kin import as_free_as
 from identify.selection.candidates import candidate_of, doubt
 from identify.selection.changes import Added, Screening
 from identify.selection.search import Found, Step, is_tied, replaced, simplest
@@ -91,12 +92,21 @@ def _in_its_place(rival: Tried, own: Tried, without: Judged, found: Found) -> Tr
     if rival.change.name in {s.change.name for s in found.steps}:
         return None
     if not isinstance(rival.change, Added):
-        return rival  # another shape of a law, which was fitted beside what the search had
+        return _curve(rival, own, without)
     for law in _values_of(rival, own):
         fitted = _level(without.fit.axis.with_effect(law), rival, own, without)
         if fitted is not None:
             return fitted
     return None
+
+
+def _curve(rival: Tried, own: Tried, without: Judged) -> Tried | None:
+    """Another shape of a law, fitted again beside all that was found; None where it is not level."""
+    if rival.change.name not in without.fit.axis.names:
+        return None
+    fit = replace(rival.change.refit(without, rival.screening), begun=without.fit.begun)
+    again = replace(rival, judged=Judged(fit, without.dataset))
+    return again if is_tied(again, own) else None
 
 
 def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
@@ -105,7 +115,7 @@ def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
     if rival.candidate.score or law.effect.delays:
         yield law
     if law.effect.kind in ALIKE:  # whose values were those of another model
-        yield _as_free_as(own.judged.fit.axis[own.change.name], law)
+        yield as_free_as(own.judged.fit.axis[own.change.name], law)
 
 
 def _level(axis: AxisModel, rival: Tried, own: Tried, without: Judged) -> Tried | None:
@@ -139,9 +149,3 @@ def _are_alike(one: Effect, other: Effect) -> bool:
     names = [{p.name for p in e.parameters if not p.strength} for e in (one, other)]
     same = one.kind is other.kind and one.kind in ALIKE and bool(names[0] & names[1])
     return same or (one.delays and other.delays)
-
-
-def _as_free_as(other: Fitted, law: Fitted) -> Fitted:
-    """A law with the values of another, and as free, where both have a parameter of that name."""
-    free = {n: v for n, v in other.values.items() if n in law.values and n not in other.fixed}
-    return replace(law, values={**law.values, **free}, fixed=law.fixed.difference(free))
