@@ -46,7 +46,7 @@ def _compared_again(step: Step, found: Found) -> Found:
     without, own = refitted_on(axis, final), replace(step.tried, judged=final)
     fitted = (_in_its_place(t, own, without, found) for t in _rivals(step, found))
     tied = [t for t in fitted if t is not None]
-    # Another shape of a law was fitted beside what the search had then, and cannot lead; nor does
+    # Another shape of a law cannot lead, as it can imitate any that may be missing; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
     # doubted: it would be doubted again, without an end.
     added = (t for t in tied if isinstance(t.change, Added))
