@@ -116,11 +116,15 @@ class Candidate:
         return self.refused is None
 
     @property
+    def is_proved(self) -> bool:
+        """Whether the data prove its force, whatever law that is."""
+        return self.score is not None and self.score.accepted
+
+    @property
     def is_of_position(self) -> bool:
         """Whether the data prove its force, and of that no more than that it is one of position."""
         alike = self.doubt is not None and self.doubt.is_of_position
-        proved = self.score is not None and self.score.accepted
-        return alike and proved and self.effect.kind is Kind.FORCE
+        return alike and self.is_proved and self.effect.kind is Kind.FORCE
 
     @property
     def part(self) -> float:

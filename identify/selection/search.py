@@ -36,6 +36,7 @@ from identify.selection.changes import (
     in_simplest_values,
 )
 from identify.selection.controls import ControlTest
+from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.trying import (
     LEADERS,
     Beside,
@@ -190,7 +191,7 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
             first, ranking = judged, ordered([*candidates, *doubted])
         if not (new := _accepted(judged, last)):
             exchanged = tried_exchanged(judged, trial, step)
-            new = _accepted(judged, exchanged) or _together(judged, last, trial, step)
+            new = _accepted(judged, exchanged) or _together(judged, last, exchanged, trial, step)
             new = new or _beside_kin(judged, trial, step) or _of_position([*last, *exchanged])
         if not new:
             break
@@ -367,18 +368,28 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
 
 
 def _together(
-    judged: Judged, tried: Sequence[Tried], trial: Beside, progress: Progress
+    judged: Judged,
+    tried: Sequence[Tried],
+    exchanged: Sequence[Tried],
+    trial: Beside,
+    progress: Progress,
 ) -> list[Step]:
     """Two changes that are accepted together, and each beside the other; none where there are not.
 
-    While one is missing, it distorts what the other leaves, so that neither is accepted alone.
+    While one is missing, it distorts what the other leaves, so that neither is accepted alone. What
+    the logs prove with their roles exchanged is followed first, whatever it takes as they are.
     """
+
+    def is_itself(t: Tried) -> bool:
+        # Which friction is out of step is told beside the right one, which may be what is missing.
+        return t.candidate.doubt in (None, IS_FRICTION)
 
     def may_help(t: Tried) -> bool:
         score, enough = t.candidate.score, RULE.promise * RULE.least_part
-        return score is not None and score.t > 0.0 and score.part > enough and not t.candidate.doubt
+        return score is not None and score.t > 0.0 and score.part > enough and is_itself(t)
 
-    ways = sorted(filter(may_help, tried), key=lambda t: -t.candidate.part)
+    ways = [*filter(is_itself, exchanged), *filter(may_help, tried)]
+    ways.sort(key=lambda t: (t not in exchanged, -t.candidate.part))
     for way in ways[:LEADERS]:
         with_it = replace(trial, taken=(*trial.taken, way.change.name))
         beside, seconds, _ = tried_beside(
@@ -391,6 +402,8 @@ def _together(
         if axis is None or score(judged, both).refused:
             continue
         alone = refitted_on(axis, both)
+        if is_of_friction(alone, both, way.change.effect):
+            continue
         if _is_needed(way.change, alone, both):
             # None of them was proved when it was chosen: they are compared again beside the second.
             near = NEARLY * way.candidate.part

@@ -101,7 +101,7 @@ def _in_its_place(rival: Tried, own: Tried, without: Judged, found: Found) -> Tr
 
 
 def _curve(rival: Tried, own: Tried, without: Judged) -> Tried | None:
-    """Another shape of a law, fitted again beside all that was found; None where it is not level."""
+    """Another shape of a law, fitted beside all that was found; None where it is not level."""
     if rival.change.name not in without.fit.axis.names:
         return None
     fit = replace(rival.change.refit(without, rival.screening), begun=without.fit.begun)

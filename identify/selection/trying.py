@@ -136,8 +136,13 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
         return judged_change(judged, t.screening, fit, 2 * score.among if score else 1)
 
-    found = (t for t in tried if t.candidate.supported or t.candidate.is_of_position)
+    found = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
     return [as_they_are(t) for t in found if not t.candidate.is_noise]
+
+
+def may_be_itself(c: Candidate) -> bool:
+    """Whether a law is proved but for what only others beside it tell: which one it is."""
+    return c.is_of_position or (c.is_proved and c.doubt == IS_FRICTION)
 
 
 def _refitted(

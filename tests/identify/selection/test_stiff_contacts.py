@@ -10,8 +10,8 @@ from benchmarks.second_simulator.contacts import DAHL, drawn, log_of
 from identify.analysis.first_model import first_model
 from identify.workflow import diagnose
 
-# What imitates it while the asymmetry is missing: a free curve of the friction, which was taken for
-# it as the selection logs ask for it; layers beside a dry friction, beside which no asymmetry helps.
+# What imitates it while the asymmetry is missing: a free curve of the friction, which was taken as
+# the selection logs ask for it; layers beside a dry friction, beside which no asymmetry helps.
 IMITATED = {"by a free curve": (0.003, 0.21, 400.0, 1), "by layers": (0.02, 0.29, 0.0, 5)}
 
 
