@@ -19,6 +19,7 @@ from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable
 from twin.importers.time_base import (
     order_of,
+    parts_of,
     rate_of_rounded,
     repeated_rows,
     rows_a_stamp,
@@ -198,8 +199,12 @@ def _is_even(steps: Array) -> bool:
     spread, usual = float(np.ptp(steps)), float(np.median(steps))
     chance = 0.05  # of the spread, by which steps that are off by chance differ from the next one
     exact = spread < 0.01 * usual
-    return exact or (
-        spread < 0.5 * usual and float(np.mean(np.abs(np.diff(steps)))) > chance * spread
+    # a program that waits for each sample is late at times, and never early
+    late = float(steps.min()) > 0.99 * usual and float((steps < 1.01 * usual).mean()) > 0.5
+    return (
+        exact
+        or late
+        or (spread < 0.5 * usual and float(np.mean(np.abs(np.diff(steps)))) > chance * spread)
     )
 
 
@@ -241,6 +246,13 @@ def _of_times(
               for other in found if other is not time and other.duration > 0.0]  # fmt: skip
     order = order_of(time.seconds)
     steps = np.diff(time.seconds if order is None else time.seconds[order])
+    if order is None and len(parts := parts_of(time.seconds)) > 1:
+        first, last = max(parts, key=lambda part: part[1] - part[0])
+        told = " or ".join(f"[{a}, {b}]" for a, b in parts if b > a != first)
+        lines.append(
+            f"rows = [{first}, {last}] # the longest part; between them is nothing: {told}"
+        )
+        steps = steps[first - 1 : last - 1]
     again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
     off = np.abs(np.delete(steps, again - 1) - time.step)
     if len(off) and off.max() > 0.01 * time.step:  # what is less even needs resample

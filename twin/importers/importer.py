@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -59,7 +59,7 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
         raise InputError(
             f"{len(paths)} files are given; several need a table [[files]] for each in the map"
         )
-    with reading(paths[0]):
+    with reading(paths[0]), _counted(mapping):
         recording = _read(paths[0], mapping)
         mapping = mapping.scaled_by(recording.scalars, 1)
         columns, facts = recording.columns, recording.facts
@@ -71,6 +71,15 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
         if not base.leaves_all:
             facts["resampled"] = base.costs(mapping, columns)
         return _log(mapping, even, mapping.resample, facts)
+
+
+@contextmanager
+def _counted(mapping: ImportMap) -> Iterator[None]:
+    """Say in an error from where its rows count, where a map takes a part of them."""
+    with (
+        at("rows {} to {}, counted from 1".format(*mapping.rows)) if mapping.rows else nullcontext()
+    ):
+        yield
 
 
 def told_of(log: Log) -> list[str]:
@@ -91,7 +100,7 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     facts: dict[str, str] = {}
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
-        with reading(path):
+        with reading(path), _counted(own):
             recording = _read(path, own)
             own, mapping = (m.scaled_by(recording.scalars, number) for m in (own, mapping))
             times = recording.absolute_times(own) + files[number - 1].offset
@@ -200,7 +209,8 @@ def table_of(path: Path, mapping: ImportMap) -> SignalTable:
 
 def _table(path: Path, mapping: ImportMap, dialect: str) -> SignalTable:
     table = all_dialects()[dialect].read(path, mapping)
-    return replace(table, columns=with_times(table.columns))
+    table = replace(table, columns=with_times(table.columns))
+    return table.part(*mapping.rows) if mapping.rows else table
 
 
 def _read(path: Path, mapping: ImportMap) -> _Recording:

@@ -279,6 +279,10 @@ class _File(Entries):
     format: str | None = Field(None, description='a format in quotes, such as "csv"')
     sample_rate: float | None = Field(None, gt=0.0, description=NUMBER + " above 0, in Hz")
     time: TimeMap | None = Field(None, description='a table such as {column = "t", unit = "s"}')
+    rows: list[Annotated[int, Field(ge=1)]] | None = Field(
+        None, min_length=2, max_length=2,
+        description="the first and the last row to take, such as [13, 5000]; rows count from 1",
+    )  # fmt: skip
 
 
 class FileMap(_File):
@@ -358,7 +362,7 @@ class ImportMap(_File):
             raise InputError(f"the map has no signal with file = {number}; leave that file out")
         return self._changed(
             lambda c: c if c.file == number else None, files=None, sample_rate=own.sample_rate,
-            time=own.time, format=own.format or self.format,
+            time=own.time, rows=own.rows, format=own.format or self.format,
         )  # fmt: skip
 
     def require_consistent(self) -> None:

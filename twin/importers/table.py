@@ -6,7 +6,7 @@ import importlib
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from types import ModuleType
@@ -48,6 +48,22 @@ class SignalTable:
     def clocks(self) -> Mapping[str, NDArray]:
         """Its columns that are times of a calendar."""
         return {name: c for name, c in self.columns.items() if np.asarray(c).dtype.kind == "M"}
+
+    def part(self, first: int, last: int) -> SignalTable:
+        """The same of its rows from one to another, which count from 1; scalars stay.
+
+        Raises InputError where it has not as many.
+        """
+        count = max((len(c) for c in self.columns.values()), default=0)
+        if not first < last <= count:
+            raise InputError(
+                f"there are {count} rows; correct the first and the last to take, in the map"
+            )
+        columns = {
+            name: c[first - 1 : last] if len(c) > 1 else c for name, c in self.columns.items()
+        }
+        line = None if self.first_line is None else self.first_line + first - 1
+        return replace(self, columns=columns, first_line=line)
 
     def hole(self, name: str, values: Array) -> str | None:
         """Where a column (n,) is not a finite number, and the remedy; None where it always is."""

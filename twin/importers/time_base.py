@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ def _require_no_return(times: Array) -> None:
     more = f" and {len(rows) - MOST_NAMED} more" if len(rows) > MOST_NAMED else ""
     raise InputError(
         f"the time falls back in {', '.join(places)}{more}: the clock was put back, or several "
-        "recordings are in one file; cut it there and import each part as a log of its own"
+        f"recordings are in one file; {_as_rows(_parts(rows, len(times)))}"
     )
 
 
@@ -196,14 +197,33 @@ def _require_finite(time: Array) -> None:
         raise InputError(f"the time in row {k + 1} is {time[k]}; give every row a time")
 
 
-def _require_no_hole(time: Array) -> None:
+def parts_of(time: Array) -> list[tuple[int, int]]:
+    """The first and the last row, from 1, of each part of times (n,) in s with a hole between."""
     steps = np.diff(time)
-    gap = int(np.argmax(steps))
-    longest_gap = 20.0  # usual steps, over which a line is no measurement
-    if steps[gap] > longest_gap * float(np.median(steps)) > 0.0:
+    longest = 20.0  # usual steps, over which a line is no measurement
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    holes = np.flatnonzero(steps > longest * usual) + 1 if usual > 0.0 else []
+    return _parts(holes, len(time))
+
+
+def _parts(ends: Iterable[int], count: int) -> list[tuple[int, int]]:
+    """The first and the last row of each part, by the last rows of all but the last."""
+    return [(a + 1, b) for a, b in pairwise([0, *map(int, ends), count])]
+
+
+def _as_rows(parts: Sequence[tuple[int, int]]) -> str:
+    """The entries of a map that take a part each."""
+    shown = " or ".join(f"rows = [{a}, {b}]" for a, b in parts[:MOST_NAMED] if a < b)
+    return f"import each part as a log of its own, with {shown} in the map"
+
+
+def _require_no_hole(time: Array) -> None:
+    parts = parts_of(time)
+    if len(parts) > 1:
+        gap = parts[0][1]
         raise InputError(
-            f"there is nothing between {instant(time[gap])} and {instant(time[gap + 1])}; import "
-            "the parts before and behind it as logs of their own"
+            f"there is nothing between {instant(time[gap - 1])} and {instant(time[gap])}"
+            f"{and_more(len(parts) - 1)}; {_as_rows(parts)}"
         )
 
 

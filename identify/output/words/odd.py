@@ -10,6 +10,7 @@ from identify.output.numbers import number, quantity
 from twin.checks.report import WHOLE, CheckReport, Fault, LogFinding, Severity
 from twin.model.units import AxisUnits
 
+NONE = 1e-3  # of the value in a log, below which that of the others is as good as none
 _TO_DO = "leave it out, or find what was otherwise"
 
 
@@ -63,4 +64,6 @@ def _otherwise(own: Otherwise, units: AxisUnits) -> str:
             return f"its force came {quantity(abs(own.there), 's')} {late}"
         case label:
             name = units.mass_name if label == "mass" else units.words(label)
+            if abs(own.elsewhere) < NONE * abs(own.there):
+                return f"{name} were there in it alone"
             return f"{name} were {number(own.there / own.elsewhere)} times as large in it"

@@ -15,8 +15,9 @@ from benchmarks.second_simulator.recordings import AXIS, recordings
 from benchmarks.silence import Case, cases
 from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Dataset
-from identify.dataset.odd_log import Recorded
+from identify.dataset.odd_log import Disagreement, Otherwise, Recorded
 from identify.estimation.disagreement import odd_in
+from identify.output.words.odd import odd_in_words
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
@@ -229,3 +230,9 @@ def test_where_one_log_alone_has_been_a_free_curve_makes_it_not_odd() -> None:
     axis = having(SLIDE, "empirical_map")
     found = identify.fit(replace(MODEL, axes={"x": axis}), logs)
     assert odd_in(found.fits["x"].axis, found.datasets["x"]) is None
+
+
+def test_what_no_other_log_has_is_told_without_a_ratio() -> None:
+    alone = Otherwise("coulomb_viscous.sigma2", 12.0, 0.0)
+    odd = replace(fitted(runs()), odd=Disagreement("run2", 5.0, 1.0, otherwise=alone))
+    assert "as if coulomb_viscous.sigma2 were there in it alone" in odd_in_words(odd)

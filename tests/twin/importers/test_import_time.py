@@ -261,3 +261,42 @@ def test_every_place_where_the_clock_was_put_back_is_told(tmp_path, resample):
     text = clocked(np.concatenate([T[:250], T[:200], T[:150]]), np.arange(COUNT))
     with pytest.raises(InputError, match=r"falls back in row 251 .* row 451 \(0\.796 s .*: the"):
         imported(tmp_path, text, clock=f'{resample}time = {{column = "t", unit = "s"}}')
+
+
+def waited() -> np.ndarray:
+    """Times in ms of a program that waits for each sample, and for something else twice."""
+    late = np.random.default_rng(7).geometric(0.8, COUNT) - 1
+    late[[3, 40]] += (215, 280)
+    return np.cumsum(10 + late)
+
+
+def test_times_that_are_late_and_never_early_are_times_though_no_name_says_so(tmp_path):
+    table = np.column_stack([waited(), Q, F])
+    np.savetxt(tmp_path / "a.csv", table, delimiter="\t", fmt="%.9g")
+    text = guess_map(tmp_path / "a.csv").text
+    assert 'time = {column = "1", unit = "ms"}' in text
+    assert "rows = [41, 600] # the longest part; between them is nothing: [1, 3] or [4, 40]" in text
+    assert "resample = 100 " in text
+
+
+def test_a_recording_with_holes_is_imported_part_by_part(tmp_path):
+    np.savetxt(tmp_path / "a.csv", np.column_stack([waited(), Q, F]), header="t,q,f",
+               delimiter=",", comments="", fmt="%.9g")  # fmt: skip
+    text = "resample = 100.0\n" + map_of("q", "f", clock="t in ms")
+    with pytest.raises(InputError, match=r"rows = \[1, 3\] or rows = \[4, 40\] or rows = \[41,"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [41, 600]\n" + text))
+    assert log.axes["x"].columns["position"][0] == pytest.approx(1e-3 * Q[40])
+    with pytest.raises(InputError, match=r"there are 600 rows; correct the first and the last"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [41, 601]\n" + text))
+
+
+def test_a_clock_that_was_put_back_names_the_parts(tmp_path):
+    times = np.concatenate([4e-3 * np.arange(400), 4e-3 * np.arange(200)])
+    np.savetxt(tmp_path / "a.csv", np.column_stack([times, Q, F]), header="t,q,f",
+               delimiter=",", comments="", fmt="%.9g")  # fmt: skip
+    text = map_of("q", "f", clock="t in s")
+    with pytest.raises(InputError, match=r"rows = \[1, 400\] or rows = \[401, 600\] in the map"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+    part = import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [401, 600]\n" + text))
+    assert len(part) == 200
