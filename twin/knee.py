@@ -26,6 +26,7 @@ class Imitated(Enum):
     OF_POSITION = "a force of position"
     CONSTANT = "a constant force"
     DRY_FRICTION = "dry friction"
+    WITHOUT_PEAK = "a friction without a static peak"
     OF_SPEED = "a friction of the speed alone"
     OF_THIS_JOINT = "a friction of this joint alone"
     DRIFT = "a slow drift"

@@ -30,6 +30,7 @@ from twin.knee import Imitated, Knee
 
 # --- what makes a law itself ----------------------------------------------------------------------
 
+SHOWN_PEAK = 1.1  # of the Coulomb friction; a static friction that is less above it is none
 COUNTS = 3.0  # of the readings; a period of one or two is their rounding, in whatever harmonic
 
 
@@ -67,6 +68,13 @@ def slips_after(size: Callable[[Mapping[str, float]], float]) -> Knee:
 
 
 DEFLECTION = slips_after(lambda v: v["Fc"] / v["sigma0"])
+
+
+PEAK = Knee(
+    # what the axis may as well rest at: noise of the path makes speeds as low, and no peak
+    "v0", "m/s", lambda v, e: v["v0"] if v["Fs"] > SHOWN_PEAK * v["Fc"] else e.speed_least,
+    lambda v, e: (e.speed_least, e.speed_max), Imitated.WITHOUT_PEAK,
+)  # fmt: skip
 
 
 def swings_at(frequency: str, below: Imitated, above: Imitated | None) -> Knee:

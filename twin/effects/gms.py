@@ -25,6 +25,7 @@ from twin.curve import STRIBECK_CURVES
 from twin.effect import DT, LEAST, MOST, OUT, VISCOUS, WHEN, Effect, Kind, Parameter, V
 from twin.law_parts import (
     ELEMENTS_SLIP,
+    PEAK,
     SPREAD,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
@@ -100,7 +101,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=(*(f"F_{i}" for i in numbers), *(f"slip_{i}" for i in numbers)),
         law=law,
-        knees=(ELEMENTS_SLIP,),
+        knees=(ELEMENTS_SLIP, PEAK),
         curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",

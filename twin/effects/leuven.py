@@ -29,6 +29,7 @@ from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Param
 from twin.law_parts import (
     BRISTLE_DAMPING,
     DEFLECTION,
+    PEAK,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
     VISCOUS_PART,
@@ -135,7 +136,7 @@ EFFECT = Effect(
     ),
     states=("F_h", "direction", "depth", *(f"turn_{i + 1}" for i in range(TURNS))),
     law=law,
-    knees=(DEFLECTION,),
+    knees=(DEFLECTION, PEAK),
     curves=STRIBECK_CURVES,
     fingerprint="residual after a reversal that depends on where the axis turned before",
     excited_by="slow reversals, small ones within larger ones, and a velocity staircase",

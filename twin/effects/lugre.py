@@ -14,6 +14,7 @@ from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, V
 from twin.law_parts import (
     BRISTLE_DAMPING,
     DEFLECTION,
+    PEAK,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
     VISCOUS_PART,
@@ -71,7 +72,7 @@ EFFECT = Effect(
     ),
     states=("z",),
     law=law,
-    knees=(DEFLECTION,),
+    knees=(DEFLECTION, PEAK),
     joint_attributes=dry_and_viscous,
     motor_attributes=motor_attributes,
     curves=STRIBECK_CURVES,

@@ -26,6 +26,7 @@ from twin.effect import DRY, DT, OUT, STATIC, VISCOUS, WHEN, Effect, Kind, Param
 from twin.law_parts import (
     BRISTLE_DAMPING,
     ELEMENTS_SLIP,
+    PEAK,
     SPREAD,
     STRIBECK_CURVE,
     STRIBECK_EXPONENT,
@@ -144,7 +145,7 @@ def of_size(elements: int) -> Effect:
         ),
         states=tuple(f"F_{i}" for i in range(1, elements + 1)),
         law=law,
-        knees=(ELEMENTS_SLIP,),
+        knees=(ELEMENTS_SLIP, PEAK),
         curves=STRIBECK_CURVES,
         fingerprint="residual after a reversal that depends on where the axis turned before",
         excited_by="slow reversals, small ones within larger ones, and a velocity staircase",
