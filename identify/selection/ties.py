@@ -44,7 +44,8 @@ def _compared_again(step: Step, found: Found) -> Found:
     if axis is None:
         return _with_step(found, step, replace(step, tied=()), final)
     without, own = refitted_on(axis, final), replace(step.tried, judged=final)
-    fitted = (_in_its_place(t, own, without, found) for t in _rivals(step, found))
+    alike = [t for t in _rivals(step, found) if not _is_refuted(t, own, without)]
+    fitted = (_in_its_place(t, own, without, found) for t in alike)
     tied = [t for t in fitted if t is not None]
     # Another shape of a law cannot lead, as it can imitate any that may be missing; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
@@ -56,9 +57,23 @@ def _compared_again(step: Step, found: Found) -> Found:
     others = tuple(t for t in ((own, *tied) if is_own else tied) if t is not leader)
     if leader is own:
         return _with_step(found, step, replace(step, tied=others), final)
-    leader = replace(leader, judged=fitted_anew(leader.judged))
+    anew = fitted_anew(leader.judged)
+    if not doubt(without, anew.fit, leader.change.effect, parameters(leader.change)):
+        leader = replace(leader, judged=anew)
     led = _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
     return _less_replaced(step.change.name, led)
+
+
+def _is_refuted(rival: Tried, own: Tried, without: Judged) -> bool:
+    """Whether the beginnings of long logs clearly refute a law in the place of what was found."""
+    dataset = without.dataset
+    if dataset.part is dataset or not isinstance(rival.change, Added):
+        return False
+    on_part = replace(without, dataset=dataset.part)
+    here = replace(own, judged=refitted_on(own.judged.fit.axis, on_part))
+    laws = [*_values_of(rival, own)]
+    there = (refitted_on(without.fit.axis.with_effect(law), on_part) for law in laws)
+    return bool(laws) and not any(is_tied(replace(rival, judged=one), here) for one in there)
 
 
 def _rivals(step: Step, found: Found) -> list[Tried]:
