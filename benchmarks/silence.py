@@ -31,6 +31,8 @@ from twin.checks.report import Fault
 TITLE = "What the logs prove, with one of five spoiled"
 SEED, MACHINES = 83, 60
 EFFECTS = tuple(name for name in HIDDEN if name != "nothing")
+# Of which a check tells what is wrong with a log, and not how little a sound one tells.
+SPOILT = {Fault.ALIASED, Fault.OUTLIERS, Fault.STEP, Fault.SATURATION, Fault.LAG}
 SOUND = 0.3  # of the machines, whose logs are all sound
 
 
@@ -113,10 +115,10 @@ def row(case: Case) -> Row:
     sound = [log for name, log in ordered if not (case.spoiled and name == case.which)]
     out["provable"] = is_provable(plant, plain, sound[:2], sound[2:])
     checked = {name: check_log(log) for name, log in ordered}
-    aliased = [n for n, c in checked.items() if any(f.fault is Fault.ALIASED for f in c.findings)]
+    faulty = [n for n, c in checked.items() if any(f.fault in SPOILT for f in c.findings)]
     refused = [name for name, report in checked.items() if not report.ok]
     odd = found.axes[AXIS].dataset.odd
-    told = [*refused, *aliased, *([odd.log] if odd else [])]
+    told = [*refused, *faulty, *([odd.log] if odd else [])]
     out["accused"] = sorted(set(told))
     out["spoiled"] = case.which if case.spoiled else None
     print(f"|   provable {out['provable']}, accused {told} |", flush=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from twin.checks.axis import READINGS, Axis
 from twin.checks.breaks import held
 from twin.checks.report import WHOLE, Fault, LogFinding, Place, Severity
-from twin.signals import Array, stretches
+from twin.signals import Array, median, stretches
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
 # Whoever knows it to be right takes the word away.
@@ -273,6 +274,7 @@ def check_command(axis: Axis) -> Iterator[LogFinding]:
         where = Place.first_of([(k / axis.sample_rate, k / axis.sample_rate) for k in single])
         remedy = "repair these samples, or cut the log there"
         yield axis.warning(Fault.OUTLIERS, what, remedy, where)
+    yield from _unanswered(axis)
     # noise that hides what the motion does not explain, even when it is averaged
     noise, averaged = axis.force_noise, axis.smoother.held_noise(axis.force_noise)
     noisy = 0.03  # averaged noise of the command, as a part of it; 1 % of its rating leaves 0.02
@@ -289,6 +291,35 @@ def check_command(axis: Axis) -> Iterator[LogFinding]:
             f"{unit} over {axis.smoother.length * 1e3:.2g} ms: about all that is left of it beside "
             "the motion",
             "record the command that the controller computed, at its rate, or shield the cable",
+        )
+
+
+def _unanswered(axis: Axis) -> Iterator[LogFinding]:
+    """A force that leaves its range within a sample and comes back as fast; no motion answers."""
+    far, longest = 2.0, 0.05  # times what 99 % of the force stays within; s
+    force, size, rate = axis.log.force - median(axis.log.force), axis.force_size, axis.sample_rate
+    jumps = np.diff(force)
+    edges = np.flatnonzero(np.abs(jumps) > far * size)
+    usual = float(np.quantile(np.abs(axis.acceleration), 0.99)) / size if size else 0.0
+    seen = []
+    for first, last in pairwise(edges.tolist()):  # the samples before each edge
+        kept = force[first + 1 : last + 1]
+        brief = 2 <= len(kept) <= max(longest * rate, 5)
+        if not brief or jumps[first] * jumps[last] > 0.0 or np.abs(kept).min() < far * size:
+            continue
+        x, near = axis.log.position, len(kept)
+        begin, end = max(first - near, 0), min(last + near, len(x) - 1)
+        made = (x[end] - x[last] - x[first] + x[begin]) * rate / near
+        asked = usual * float(kept.sum()) / rate  # change of speed, as far as forces here make any
+        if made * np.sign(asked) < 0.5 * abs(asked):
+            seen.append((first, last, float(kept[np.argmax(np.abs(kept))])))
+    if seen:
+        most, unit = seen[0][2], axis.log.kind.force
+        yield axis.warning(
+            Fault.OUTLIERS,
+            f"the force jumps by {most:.3g} {unit} and back, which no motion answers",
+            "repair these samples, or cut the log there",
+            Place.first_of([((a + 1) / rate, b / rate) for a, b, _ in seen]),
         )
 
 
@@ -319,14 +350,14 @@ def off_course(signal: Array) -> Array:
 
 def check_saturation(axis: Axis) -> Iterator[LogFinding]:
     """Saturation of the command; a force that goes in steps has its extremes by itself."""
-    force = axis.log.force
-    if _goes_in_steps(axis):
-        return
+    force, in_steps = axis.log.force, _goes_in_steps(axis)
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
         if extreme == 0.0:  # a drive that is off
             continue
-        stuck = _exactly(axis, force, extreme)
-        if stuck is None and not axis.force_held:
+        stuck = _piled(axis, force, extreme)
+        if stuck is None and not in_steps:
+            stuck = _exactly(axis, force, extreme)
+        if stuck is None and not in_steps and not axis.force_held:
             stuck = _but_for_noise(axis, sign * axis.force)
         if stuck:
             first, seconds = stuck
@@ -354,9 +385,26 @@ def _goes_in_steps(axis: Axis) -> bool:
     return float(largest.sum()) >= most * float(changes.sum())
 
 
+def _at(extreme: float, force: Array) -> NDArray[np.bool_]:
+    """Which samples of a force (n,) are at its extreme, to rounding."""
+    return np.asarray(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
+
+
+def _piled(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
+    """Likewise, of a rough force whose samples have values of their own, but for many there.
+
+    It comes to its limit and leaves it again from sample to sample.
+    """
+    few, own = 20, 0.5  # samples that are no pile; part of all that no other one equals
+    at_it = np.flatnonzero(_at(extreme, force))
+    if len(at_it) <= few or len(np.unique(force)) < own * len(force):
+        return None
+    return at_it[0] / axis.sample_rate, len(at_it) / axis.sample_rate
+
+
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Start of the first interval at the extreme and length of all, s."""
-    starts, lengths = _runs(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
+    starts, lengths = _runs(_at(extreme, force))
     # s at one value exactly; five samples at least, where so long is fewer
     stuck = lengths >= max(5e-3 * axis.sample_rate, 5, 2 * axis.force_held)
     if not stuck.any():
