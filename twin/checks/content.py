@@ -354,9 +354,8 @@ def check_saturation(axis: Axis) -> Iterator[LogFinding]:
     for sign, extreme in ((1.0, force.max()), (-1.0, force.min())):
         if extreme == 0.0:  # a drive that is off
             continue
-        stuck = _piled(axis, force, extreme)
-        if stuck is None and not in_steps:
-            stuck = _exactly(axis, force, extreme)
+        stuck = None if in_steps else _exactly(axis, force, extreme)
+        stuck = stuck or _piled(axis, force, extreme)
         if stuck is None and not in_steps and not axis.force_held:
             stuck = _but_for_noise(axis, sign * axis.force)
         if stuck:
