@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
+from identify.fleet.engine import engine
 from studies.curves.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from studies.curves.friction_curve import StribeckCurve, fit_stribeck
 from studies.curves.velocity_map import VelocityMap
@@ -73,15 +75,12 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     found = VelocityMap.joined(maps)
     reversals = Reversals(name, repeats=repeats, amplitude=AMPLITUDE, effort=GENTLE, dwell=0.02)
     log = simulate(model, reversals, simulator=simulator)
+    with engine() as (workers, _):
+        of_noise = [partial(_trial, model, found, log, snr) for snr in ratios]
+        rows = [[*workers.map(trial, rng.spawn(trials))] for trial in of_noise]
     by_snr, tried = {}, {}
-    for snr in ratios:
-        rows = []
-        for _ in range(trials):
-            noise = 10.0 ** (-snr / 20.0)
-            static = static_of(noisy_map(found, noise, rng))
-            logs = prepared(model, noisy(log, log.truth[name][effect.name], noise, rng))
-            rows.append([*static, *dynamic_of(axis, static, logs, rng)])
-        tried[snr] = dict(zip(PRINTED, np.array(rows).T, strict=True))
+    for snr, each in zip(ratios, rows, strict=True):
+        tried[snr] = dict(zip(PRINTED, np.array(each).T, strict=True))
         by_snr[f"{snr:g}"] = {
             p: study.recovered(values[p], tried[snr][p], effect.parameter(p).unit, printed)
             for p, printed in PRINTED.items()
@@ -96,6 +95,18 @@ def run(small: bool, rng: np.random.Generator) -> Found:
                 "friction_unit": "N"},
     }  # fmt: skip
     return Found(numbers, words(numbers), pictures(numbers, found, true, tried[own]))
+
+
+def _trial(
+    model: MachineModel, found: VelocityMap, log: Log, snr: float, rng: np.random.Generator
+) -> Array:
+    """The parameters (6,) that the map and the reversals tell with noise of a ratio, dB."""
+    ((name, axis),) = model.axes.items()
+    noise = 10.0 ** (-snr / 20.0)
+    static = static_of(noisy_map(found, noise, rng))
+    felt = log.truth[name][friction_of(axis).effect.name]
+    logs = prepared(model, noisy(log, felt, noise, rng))
+    return np.array([*static, *dynamic_of(axis, static, logs, rng)])
 
 
 def noisy_map(found: VelocityMap, noise: float, rng: np.random.Generator) -> VelocityMap:
