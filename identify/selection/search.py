@@ -388,8 +388,9 @@ def _together(
         score, enough = t.candidate.score, RULE.promise * RULE.least_part
         return score is not None and score.t > 0.0 and score.part > enough and is_itself(t)
 
-    ways = [*filter(is_itself, exchanged), *filter(may_help, tried)]
-    ways.sort(key=lambda t: (t not in exchanged, -t.candidate.part))
+    shown = {t.change.name: t for t in exchanged if is_itself(t)}
+    others = (t for t in tried if may_help(t) and t.change.name not in shown)
+    ways = [*shown.values(), *sorted(others, key=lambda t: -t.candidate.part)]
     for way in ways[:LEADERS]:
         with_it = replace(trial, taken=(*trial.taken, way.change.name))
         beside, seconds, _ = tried_beside(
