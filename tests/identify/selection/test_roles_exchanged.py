@@ -74,3 +74,18 @@ def test_what_a_test_log_refuses_takes_no_other_law_with_it() -> None:
     model = first_model({"one": one}, "drive", CATALOGUE)
     found = diagnose(model, other, one, test, catalogue=CATALOGUE).axes["q"]
     assert {"cogging", "cogging_2"} <= set(found.named)
+
+
+@pytest.mark.slow
+def test_a_lag_that_one_order_refuses_alone_is_followed_to_the_friction_that_hides_it() -> None:
+    """In that order the friction out of step took as much, and nothing was named at ten floors."""
+    drive, recorder = DRIVES["actuator"], Recorder(2000, 2000, mean=False, coarse=True)
+    plant = HIDDEN["lag"][0](drive, recorder)
+    one, other, test = (log_of(drive, plant, recorder, 3 * 73047 + i) for i in range(3))
+    model = first_model({"one": one, "other": other}, "drive", CATALOGUE)
+    for pair in ((one, other), (other, one)):
+        found = diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"]
+        families = [{f.effect, *f.tied} for f in found.findings]
+        assert any("actuator_lag" in family for family in families)
+        assert any("presliding_hysteresis" in f or "lugre" in f for f in families)
+        assert found.final.ratio < 1.5
