@@ -55,12 +55,11 @@ class _Promised:
 def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[Pair]:
     """The pairs that may leave less than a fit does, refitted, the best first.
 
-    Of those whose modifier is accepted beside its friction. None where nothing of the fit remembers
-    a path.
+    Of those whose modifier is accepted beside its friction.
     """
     axis, present = judged.fit.axis, judged.fit.axis.friction
     layers = [n for n in trial.taken if n in axis.names and _remembers(axis[n].effect)]
-    if present is None or judged.at_floor or not (layers or present.effect.remembers):
+    if present is None or judged.at_floor:
         return []
     bare = axis
     for name in layers:
