@@ -55,11 +55,12 @@ class _Promised:
 def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[Pair]:
     """The pairs that may leave less than a fit does, refitted, the best first.
 
-    Of those whose modifier is accepted beside its friction.
+    Of those whose modifier is accepted beside its friction. None of a joint beside its bodies: what
+    these leave is in each of its joints.
     """
     axis, present = judged.fit.axis, judged.fit.axis.friction
     layers = [n for n in trial.taken if n in axis.names and _remembers(axis[n].effect)]
-    if present is None or judged.at_floor:
+    if present is None or judged.at_floor or judged.dataset.beside_bodies:
         return []
     bare = axis
     for name in layers:

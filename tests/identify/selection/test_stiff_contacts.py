@@ -12,7 +12,8 @@ from identify.workflow import diagnose
 
 # What imitates it while the asymmetry is missing: a free curve of the friction, which was taken as
 # the selection logs ask for it; layers beside a dry friction, beside which no asymmetry helps.
-IMITATED = {"by a free curve": (0.003, 0.21, 400.0, 1), "by layers": (0.02, 0.29, 0.0, 5)}
+IMITATED = {"by a free curve": (0.003, 0.21, 400.0, 1), "by layers": (0.02, 0.29, 0.0, 5),
+            "by nothing": (0.003, -0.27, 57.0, 13)}  # fmt: skip
 
 
 @pytest.mark.slow
