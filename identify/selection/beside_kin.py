@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from identify.estimation.variable_projection import absent_effects
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.changes import Added, Screening, from_all_starts
@@ -58,19 +59,15 @@ def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[Pair
     Of those whose modifier is accepted beside its friction. None of a joint beside its bodies: what
     these leave is in each of its joints.
     """
-    axis, present = judged.fit.axis, judged.fit.axis.friction
-    layers = [n for n in trial.taken if n in axis.names and _remembers(axis[n].effect)]
+    bare, present = judged.fit.axis, judged.fit.axis.friction
     if present is None or judged.at_floor or judged.dataset.beside_bodies:
         return []
-    bare = axis
-    for name in layers:
-        bare = bare if name == present.effect.name else bare.without(name)
-    frictions = [
-        effect
-        for effect in trial.catalogue.values()
-        if effect.kind is Kind.FRICTION and effect.remembers
-        if effect.name not in {present.effect.name, *trial.barred}
-    ]
+    forces = (f.effect for f in bare.effects if f.effect.kind is Kind.FORCE)
+    for layers in (e for e in forces if e.remembers and e.name in trial.taken):
+        bare = bare.without(layers.name)
+    every = absent_effects(judged.fit.axis, trial.catalogue)
+    kin = (e for e in every if e.kind is Kind.FRICTION and e.remembers)
+    frictions = [e for e in kin if e.name not in trial.barred]
     beside = spread(
         lambda effect: [*_promised(judged, bare, effect, trial)],
         frictions,
@@ -83,11 +80,6 @@ def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[Pair
     return sorted(proved, key=lambda p: p.modifier.judged.fit.error)
 
 
-def _remembers(effect: Effect) -> bool:
-    """Whether it is a friction, or makes the force of one, that remembers its path."""
-    return effect.remembers and effect.kind in (Kind.FRICTION, Kind.FORCE)
-
-
 def _promised(
     judged: Judged, bare: AxisModel, friction: Effect, trial: Beside
 ) -> Iterator[_Promised]:
@@ -95,10 +87,9 @@ def _promised(
     assert bare.friction is not None
     law = as_free_as(bare.friction, Fitted.at_start(friction))
     there = refitted_on(bare.with_effect(law), judged)
-    known = {*trial.taken, *bare.names, *trial.barred}
     controls = ControlTest.beside(there)
-    for effect in trial.catalogue.values():
-        if effect.kind is Kind.MODIFIER and effect.name not in known and bare.can_have(effect):
+    for effect in trial.absent(judged):
+        if effect.kind is Kind.MODIFIER:
             yield _Promised(friction, there, Added(effect).screen(there, controls))
 
 

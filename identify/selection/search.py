@@ -399,13 +399,7 @@ def _together(
         if not (then := _accepted(beside, seconds)):
             continue
         both, second = then[0].tried.judged, then[0]
-        axis = way.change.undone(both.fit.axis, judged.fit.axis)
-        if axis is None or score(judged, both).refused:
-            continue
-        alone = refitted_on(axis, both)
-        if is_of_friction(alone, both, way.change.effect):
-            continue
-        if _is_needed(way.change, alone, both):
+        if _are_needed(way.change, both, judged):
             # None of them was proved when it was chosen: they are compared again beside the second.
             near = NEARLY * way.candidate.part
             level = tuple(t for t in ways if t is not way and t.candidate.part >= near)
@@ -416,13 +410,18 @@ def _together(
 def _beside_kin(judged: Judged, trial: Beside, progress: Progress) -> list[Step]:
     """Another friction with what modifies it, where the logs ask for both together."""
     for pair in pairs_beside(judged, trial, progress):
-        both, change = pair.modifier.judged, pair.friction.change
-        axis = change.undone(both.fit.axis, judged.fit.axis)
-        if axis is None or score(judged, both).refused:
-            continue
-        if _is_needed(change, refitted_on(axis, both), both):
+        if _are_needed(pair.friction.change, pair.modifier.judged, judged):
             return [Step(pair.friction, with_others=True), Step(pair.modifier, with_others=True)]
     return []
+
+
+def _are_needed(way: Change, both: Judged, judged: Judged) -> bool:
+    """Whether a change and one beside it are accepted together, and it beside the other."""
+    axis = way.undone(both.fit.axis, judged.fit.axis)
+    if axis is None or score(judged, both).refused:
+        return False
+    alone = refitted_on(axis, both)
+    return not is_of_friction(alone, both, way.effect) and _is_needed(way, alone, both)
 
 
 def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:

@@ -44,8 +44,8 @@ def _compared_again(step: Step, found: Found) -> Found:
     if axis is None:
         return _with_step(found, step, replace(step, tied=()), final)
     without, own = refitted_on(axis, final), replace(step.tried, judged=final)
-    alike = [t for t in _rivals(step, found) if not _is_refuted(t, own, without)]
-    fitted = (_in_its_place(t, own, without, found) for t in alike)
+    rivals = _not_refuted(_rivals(step, found), own, without)
+    fitted = (_in_its_place(t, own, without, found) for t in rivals)
     tied = [t for t in fitted if t is not None]
     # Another shape of a law cannot lead, as it can imitate any that may be missing; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
@@ -64,16 +64,19 @@ def _compared_again(step: Step, found: Found) -> Found:
     return _less_replaced(step.change.name, led)
 
 
-def _is_refuted(rival: Tried, own: Tried, without: Judged) -> bool:
-    """Whether the beginnings of long logs clearly refute a law in the place of what was found."""
-    dataset = without.dataset
-    if dataset.part is dataset or not isinstance(rival.change, Added):
-        return False
-    on_part = replace(without, dataset=dataset.part)
+def _not_refuted(rivals: list[Tried], own: Tried, without: Judged) -> list[Tried]:
+    """Those that the beginnings of long logs do not clearly refute in its place."""
+    if without.dataset.part is without.dataset:
+        return rivals
+    on_part = replace(without, dataset=without.dataset.part)
     here = replace(own, judged=refitted_on(own.judged.fit.axis, on_part))
-    laws = [*_values_of(rival, own)]
-    there = (refitted_on(without.fit.axis.with_effect(law), on_part) for law in laws)
-    return bool(laws) and not any(is_tied(replace(rival, judged=one), here) for one in there)
+
+    def may_be_level(rival: Tried) -> bool:
+        laws = [*_values_of(rival, own)] if isinstance(rival.change, Added) else []
+        there = (refitted_on(without.fit.axis.with_effect(law), on_part) for law in laws)
+        return not laws or any(is_tied(replace(rival, judged=one), here) for one in there)
+
+    return [rival for rival in rivals if may_be_level(rival)]
 
 
 def _rivals(step: Step, found: Found) -> list[Tried]:

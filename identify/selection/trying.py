@@ -69,6 +69,12 @@ class Beside:
     barred: Collection[str] = ()
     least: float = RULE.least_part
 
+    def absent(self, judged: Judged) -> list[Effect]:
+        """The effects that a fit does not have, and that may be tried beside it."""
+        known = {*self.taken, *judged.fit.begun.names, *self.barred}
+        every = absent_effects(judged.fit.axis, self.catalogue)
+        return [e for e in every if e.name not in known]
+
 
 def tried_beside(
     judged: Judged, trial: Beside, progress: Progress = silent
@@ -81,8 +87,7 @@ def tried_beside(
     If the values of the best without its change are a better start for the fit, it is refitted from
     there: a fit short of its optimum would let every change in.
     """
-    known, barred = {*trial.taken, *judged.fit.begun.names, *trial.barred}, trial.barred
-    effects = [e for e in absent_effects(judged.fit.axis, trial.catalogue) if e.name not in known]
+    barred, effects = trial.barred, trial.absent(judged)
     plain = [Added(e) for e in effects if not e.is_noise]
     held = (c for c in freed_of(judged.fit.axis) if c.name not in barred)
     freed = [c for c in held if not c.is_strength or c.name in trial.catalogue]

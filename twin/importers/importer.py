@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -76,9 +76,10 @@ def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> L
 @contextmanager
 def _counted(mapping: ImportMap) -> Iterator[None]:
     """Say in an error from where its rows count, where a map takes a part of them."""
-    with (
-        at("rows {} to {}, counted from 1".format(*mapping.rows)) if mapping.rows else nullcontext()
-    ):
+    if mapping.rows is None:
+        yield
+        return
+    with at("rows {} to {}, the first of them as row 1".format(*mapping.rows)):
         yield
 
 
