@@ -14,10 +14,10 @@ from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
-from identify.fleet.engine import engine, outcomes
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
+from twin.engine import engine, outcomes
 from twin.logs import Log
 from twin.model.machine import MachineModel
 

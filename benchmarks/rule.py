@@ -19,8 +19,8 @@ from benchmarks.selftest.laws import OUTSIDE
 from benchmarks.selftest.machines import Case
 from benchmarks.selftest.tally import rates
 from benchmarks.selftest.trial import TrialResult, run
-from identify.fleet.engine import engine
 from identify.rules import RULE
+from twin.engine import engine
 
 TITLE = "The rule's numbers, each halved and doubled"
 MACHINES, SEED = 24, 3111

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from threading import Lock
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
 
 from twin.threads import one_for_matrices
 
@@ -37,6 +37,15 @@ def within(progress: Progress, where: str) -> Progress:
 T = TypeVar("T")
 R = TypeVar("R")
 Done = Callable[[int, int], None]
+
+
+class Spread(Protocol):
+    """The results of a job for each item, in their order: by ``spread``, or by an engine."""
+
+    def __call__(
+        self, job: Callable[[T], R], items: Iterable[T], done: Done | None = None, /
+    ) -> list[R]: ...
+
 
 _POOL: ContextVar[ThreadPoolExecutor | Literal["in a job"] | None] = ContextVar(
     "pool", default=None

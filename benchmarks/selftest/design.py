@@ -14,9 +14,9 @@ from benchmarks.selftest.laws import OUTSIDE
 from benchmarks.selftest.machines import AXIS, STAGE, Case
 from benchmarks.selftest.trial import TrialResult, run
 from benchmarks.selftest.variations import VARIATIONS
-from identify.fleet.engine import engine, outcomes
 from twin.effect import Kind
 from twin.effects import Catalogue, load_catalogue
+from twin.engine import engine, outcomes
 from twin.logs.writer import software_version
 from twin.model.file import load_model
 from twin.numbers import require_seed

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from identify.cli.command import Commands, Said, progress_on_stderr, tried
-from identify.cli.shared import Effects, app, written
+from identify.cli.shared import Effects, Scheduler, app, written
 from twin.errors import InputError
 from twin.telling import heard
 
@@ -44,13 +44,6 @@ PatternOption = Annotated[
         "'{machine}/{started}.mcap'."
     ),
 ]
-Scheduler = Annotated[
-    str | None,
-    Option(
-        metavar="ADDRESS",
-        help="Dask scheduler whose workers do it, as tcp://host:8786; this computer if left out.",
-    ),
-]
 Ingested = Annotated[
     Path | None,
     Option(
@@ -79,12 +72,12 @@ def ingest(
 
     Example: twin fleet ingest nights --model stage.toml --store fleet
     """
-    from identify.fleet.engine import needed
     from identify.fleet.found_logs import Pattern
     from identify.fleet.ingest import ingest as run
     from identify.fleet.models import Models
     from identify.output.answers.fleet import IngestAnswer
     from identify.output.words.fleet import ingested_in_words
+    from twin.engine import needed
 
     needed("pyarrow")
     known = Models.at(model, effects or ())
@@ -135,10 +128,10 @@ def report(
 
     Example: twin fleet report --store fleet -o fleet.html
     """
-    from identify.fleet.engine import needed
     from identify.output.answers.fleet import FloorAnswer
     from identify.output.report.fleet import write_fleet
     from identify.output.words.fleet import floor_in_words
+    from twin.engine import needed
 
     needed("duckdb")
     if (logs is None) != (model is None):
@@ -182,9 +175,9 @@ def demo(
     Example: twin fleet demo -o fleet-demo
     """
     from identify.fleet.demo import demo as run
-    from identify.fleet.engine import needed
     from identify.output.answers.fleet import FleetDemoAnswer
     from identify.output.words.fleet import demo_in_words
+    from twin.engine import needed
 
     needed("duckdb")
     with progress_on_stderr() as progress, heard() as silent:
@@ -210,12 +203,12 @@ def kind(
     Example: twin fleet kind stage.toml --store fleet -o new_stage.toml
     """
     from identify.cli.shared import loaded
-    from identify.fleet.engine import needed
     from identify.fleet.kind import FEWEST, begun, kinds
     from identify.fleet.nights import panels
     from identify.fleet.store import Store
     from identify.output.answers.fleet import KindAnswer
     from identify.output.words.fleet import kind_in_words
+    from twin.engine import needed
     from twin.model.file import save_model
 
     needed("duckdb")

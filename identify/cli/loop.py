@@ -26,6 +26,7 @@ from identify.cli.shared import (
     ModelOption,
     Recordings,
     Report,
+    Scheduler,
     Test,
     TestFunction,
     app,
@@ -395,6 +396,7 @@ def plan(
     out: Annotated[Path, written("Experiment to write (.toml).")] = Path("experiment.toml"),
     holdout: Holdout = None,
     test_function: TestFunction = None,
+    scheduler: Scheduler = None,
     effects: Effects = None,
 ) -> Said:
     """Choose the experiment that decides between explanations; `twin simulate` runs it.
@@ -402,6 +404,7 @@ def plan(
     Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
     """
     from identify import workflow
+    from twin.engine import engine, in_order
     from twin.experiments.file import SUFFIX, save_experiment
     from twin.export.setpoints import ENDING, write_setpoints
 
@@ -412,7 +415,8 @@ def plan(
         workflow.plan, between=[_rival(name, catalogue) for name in between or ()],
         catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
     )  # fmt: skip
-    done = with_logs(job, machine, logs, holdout)
+    with engine(scheduler) as workers:
+        done = with_logs(partial(job, over=partial(in_order, *workers)), machine, logs, holdout)
     if not done.result.decides:
         return said_of(done.result, done.warnings, fine=False)
     chosen, table = done.result.chosen, out.with_suffix(ENDING)

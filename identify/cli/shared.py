@@ -63,6 +63,13 @@ Test = Annotated[
         "that is reported.",
     ),
 ]
+Scheduler = Annotated[
+    str | None,
+    Option(
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers do it, as tcp://host:8786; this computer if left out.",
+    ),
+]
 TestFunction = Annotated[
     float | None,
     Option(

@@ -36,7 +36,7 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.model.parameters import free_parameters, read
 from twin.model.units import AxisUnits
-from twin.parallel import Progress, silent, spread
+from twin.parallel import Progress, Spread, silent, spread
 from twin.signals import Array
 from twin.simulation.simulate import outside_travel, simulate
 from twin.simulation.simulators import quickest
@@ -171,20 +171,27 @@ def favoured(arena: Arena) -> tuple[str, float]:
 
 
 def contest(
-    arena: Arena, experiments: Sequence[Experiment], progress: Progress = silent
+    arena: Arena,
+    experiments: Sequence[Experiment],
+    progress: Progress = silent,
+    over: Spread = spread,
 ) -> tuple[list[SimulatedExperiment], tuple[NotRun, ...]]:
     """Every experiment simulated and judged, best first; and those that the machine cannot run."""
+    _ = arena.known  # computed once, and sent along with the arena
+    judged = over(partial(_judged, arena), experiments, partial(progress, "trying experiments"))
+    ranked = sorted(
+        (j for j in judged if isinstance(j, SimulatedExperiment)), key=lambda t: -t.gain
+    )
+    return ranked, tuple(j for j in judged if isinstance(j, NotRun))
+
+
+def _judged(arena: Arena, experiment: Experiment) -> SimulatedExperiment | NotRun:
     judge = _discriminating if len(arena.explanations) > 1 else _informative
-    motions, not_run = [], []
-    for i, experiment in enumerate(experiments):
-        progress("trying experiments", i, len(experiments))
-        try:
-            motions.append((experiment, arena.record(arena.explanations[0], experiment)))
-        except CannotRun as why:
-            not_run.append(NotRun(experiment, str(why), arena.machine.axes[arena.name].units))
-    judging = partial(progress, "judging experiments")
-    judged = spread(lambda pair: judge(arena, *pair), motions, judging)
-    return sorted(judged, key=lambda t: -t.gain), tuple(not_run)
+    try:
+        motion = arena.record(arena.explanations[0], experiment)
+    except CannotRun as why:
+        return NotRun(experiment, str(why), arena.machine.axes[arena.name].units)
+    return judge(arena, experiment, motion)
 
 
 def _discriminating(arena: Arena, experiment: Experiment, motion: Motion) -> SimulatedExperiment:
@@ -251,7 +258,9 @@ def _answer(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
     return np.column_stack([residual(axis, logs), jacobian(axis, logs, where)])
 
 
-def refitted(arena: Arena, simulated: SimulatedExperiment) -> SimulatedExperiment:
+def refitted(
+    arena: Arena, simulated: SimulatedExperiment, over: Spread = spread
+) -> SimulatedExperiment:
     """The simulated experiment judged by full refits, each explanation in turn being the truth.
 
     The linear step of `contest` is exact only for small differences; this is exact, and slower.
@@ -259,16 +268,22 @@ def refitted(arena: Arena, simulated: SimulatedExperiment) -> SimulatedExperimen
     """
     if len(arena.explanations) < 2:
         return simulated
-    found = []
-    for truth in arena.explanations:
-        try:
-            motion = arena.record(truth, simulated.experiment)
-        except CannotRun as why:
-            cannot = NotRun(simulated.experiment, str(why), simulated.units, truth.name)
+    judged = over(partial(_if_true, arena, simulated), arena.explanations)
+    for cannot in judged:
+        if isinstance(cannot, NotRun):
             return replace(simulated, gain=0.0, difference=0.0, not_run=cannot)
-        found.append(_beside_rivals(arena, truth, arena.logs_with(motion)))
-    gain, difference = min(found)
+    gain, difference = min(j for j in judged if not isinstance(j, NotRun))
     return replace(simulated, gain=gain, difference=difference)
+
+
+def _if_true(
+    arena: Arena, simulated: SimulatedExperiment, truth: Explanation
+) -> tuple[float, float] | NotRun:
+    try:
+        motion = arena.record(truth, simulated.experiment)
+    except CannotRun as why:
+        return NotRun(simulated.experiment, str(why), simulated.units, truth.name)
+    return _beside_rivals(arena, truth, arena.logs_with(motion))
 
 
 def _beside_rivals(
@@ -276,7 +291,7 @@ def _beside_rivals(
 ) -> tuple[float, float]:
     """Evidence against the nearest rival of a truth, and its difference (N RMS) on the new log."""
     own, found = fit_axis(truth.axis, logs), []
-    for rival in (e for e in arena.explanations if e is not truth):
+    for rival in (e for e in arena.explanations if e.name != truth.name):
         fit = fit_axis(rival.axis, logs)
         kept = own.kept & fit.kept
         after, before = (residual(f.axis, logs)[kept] for f in (own, fit))

@@ -44,7 +44,7 @@ from twin.experiments.trajectory import require_length
 from twin.logs import GivenLogs, logs_by_name
 from twin.model.file import as_model
 from twin.model.machine import MachineModel
-from twin.parallel import Progress, parallel, silent, within
+from twin.parallel import Progress, Spread, parallel, silent, spread, within
 
 DURATION = 20.0  # s of a planned experiment
 
@@ -93,14 +93,16 @@ def plan(
     duration: float = DURATION,
     test_function: float | None = None,
     progress: Progress = silent,
+    over: Spread = spread,
 ) -> Plan:
     """Find the experiment within the machine's limits that decides between explanations.
 
     between: effects, each added to the model, or models; refitted where there are logs. Where it is
     empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
     separate, or for the best and the runner-up; without logs or a missing effect, it is for the
-    model's own parameters. duration: of the experiment, s. Raises InputError for an
-    unknown axis, an axis whose travel is not known, and explanations that are the same.
+    model's own parameters. duration: of the experiment, s. over: what the experiments are tried
+    on, threads of this process or the workers of an engine. Raises InputError for an unknown axis,
+    an axis whose travel is not known, and explanations that are the same.
     """
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)
@@ -119,7 +121,7 @@ def plan(
     arena = _arena(model, dataset, bool(logs), between, catalogue, test_function, progress)
     effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
     verified = 6  # experiments at most that are judged again by full refits
-    return _planned(arena, duration, verified, not logs, effects, progress)
+    return _planned(arena, duration, verified, not logs, effects, progress, over)
 
 
 def next_experiments(
@@ -154,6 +156,7 @@ def _planned(
     supposed: bool,
     effects: Mapping[str, Effect],
     progress: Progress = silent,
+    over: Spread = spread,
 ) -> Plan:
     arena.machine.require_mass()
     logs = arena.logs
@@ -162,7 +165,7 @@ def _planned(
         # The logs already refute a rival, so they would decide whatever the new experiment is.
         arena = replace(arena, logs=())
     experiments, too_long = proposals(arena.machine, arena.name, duration)
-    ranked, not_run = contest(arena, experiments, progress)
+    ranked, not_run = contest(arena, experiments, progress, over)
     if not ranked:
         first = f"{in_short(not_run[0].experiment, not_run[0].units)}: {not_run[0].reason}"
         raise CannotRun(
@@ -170,7 +173,7 @@ def _planned(
             f"the first: {first}"
         )
     progress("best experiments judged by refits", 0, 1)
-    ranking = tuple(_verified(arena, ranked, verified))
+    ranking = tuple(_verified(arena, ranked, verified, over))
     names = tuple(e.name for e in arena.explanations)
     return Plan(
         axis=arena.name,
@@ -185,7 +188,7 @@ def _planned(
 
 
 def _verified(
-    arena: Arena, ranked: Sequence[SimulatedExperiment], most: int
+    arena: Arena, ranked: Sequence[SimulatedExperiment], most: int, over: Spread
 ) -> list[SimulatedExperiment]:
     """The experiments, the best of them judged again by full refits; the best of these is first.
 
@@ -195,7 +198,7 @@ def _verified(
     for i, one in enumerate(ranked[:most]):
         if i and done[0].gain >= one.gain:
             break
-        done.append(refitted(arena, one))
+        done.append(refitted(arena, one, over))
         done.sort(key=lambda t: -t.gain)
     return [*done, *ranked[len(done) :]]
 

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from identify.fleet.cause import with_causes
-from identify.fleet.engine import engine, outcomes
 from identify.fleet.floor import STAGE, Plan, Planted, nights_of, record_night
 from identify.fleet.ingest import ingest
 from identify.fleet.models import Models
@@ -18,6 +17,7 @@ from identify.fleet.state import floor_of
 from identify.fleet.store import Store
 from identify.output.report.fleet import write_fleet
 from identify.results.fleet import Alarm, Floor, Told
+from twin.engine import engine, outcomes
 from twin.files import make_folder, write_atomically
 from twin.parallel import Progress, silent
 

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from identify.fleet.engine import engine, outcomes
 from identify.fleet.found_logs import Pattern, logs_below
 from identify.fleet.models import Models
 from identify.fleet.record import State, Task, record
 from identify.fleet.store import FEW, PACK_FROM, Store
 from identify.results.fleet import Ingested
+from twin.engine import engine, outcomes
 from twin.parallel import Progress, silent
 
 MOST_TOLD = 20  # bad logs that are told line by line; all of them are in `findings`

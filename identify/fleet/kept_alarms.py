@@ -8,10 +8,10 @@ from dataclasses import fields
 from typing import Any
 
 from identify.fleet.columns import ALARM
-from identify.fleet.engine import needed
 from identify.fleet.nights import Panel, panels
 from identify.fleet.store import Contents, Store, parquet, table
 from identify.results.fleet import Alarm, Scope
+from twin.engine import needed
 from twin.errors import Unwritten
 from twin.files import write_atomically
 

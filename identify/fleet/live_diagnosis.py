@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from identify.fleet.engine import local
 from identify.fleet.watch import Window
 from identify.results.fleet import LiveAlarm, LiveCause
 from identify.workflow import diagnose
 from twin.effects import load_catalogue
+from twin.engine import local
 from twin.errors import InputError
 from twin.logs import Log
 from twin.logs.log import joined

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from identify.fleet.columns import VIEWS, Column
-from identify.fleet.engine import needed
 from identify.fleet.kept_alarms import alarms, as_table
 from identify.fleet.store import Store
 from identify.fleet.views import connected, listed
+from twin.engine import needed
 from twin.errors import InputError
 from twin.files import write_atomically
 

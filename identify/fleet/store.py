@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from identify.fleet.columns import RECORD, TYPES, Column
-from identify.fleet.engine import needed
+from twin.engine import needed
 from twin.errors import InputError
 from twin.files import lock, make_folder, write_atomically
 from twin.parallel import cores

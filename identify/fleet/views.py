@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from identify.fleet.columns import RECORD, VIEWS
-from identify.fleet.engine import needed
 from identify.fleet.store import Contents, table
+from twin.engine import needed
 
 KINDS = {"fits": "fit", "findings": "finding"}
 

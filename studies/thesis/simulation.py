@@ -20,7 +20,6 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import residual
-from identify.fleet.engine import engine
 from studies.curves.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from studies.curves.friction_curve import StribeckCurve, fit_stribeck
 from studies.curves.velocity_map import VelocityMap
@@ -28,6 +27,7 @@ from studies.drawing import BLUE, ORANGE, Picture
 from studies.telling import Line, Panel, picture
 from studies.thesis import study
 from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of
+from twin.engine import engine
 from twin.experiments.kinds import Reversals, Staircase
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel

@@ -10,17 +10,20 @@ import sys
 import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
 from cli_runs import process, refusal
 from fleet_cases import MODELS, recorded, rows
+from machines import CATALOGUE, STAGE
 
-from identify.fleet.engine import AHEAD, cluster, needed, outcomes
+from identify.experiment_design.plan import plan
 from identify.fleet.ingest import ingest
 from identify.fleet.sql import ask
 from identify.fleet.store import Store
+from twin.engine import AHEAD, cluster, engine, in_order, needed, outcomes
 from twin.errors import InputError
 
 pytest.importorskip("pyarrow")
@@ -68,6 +71,17 @@ def test_ten_thousand_tasks_are_handed_over_a_few_at_a_time() -> None:
     assert ahead <= 2 * 2 * AHEAD
 
 
+@pytest.mark.parametrize("count", [0, 1, 7, 26])
+def test_results_come_in_the_order_of_what_was_given_and_their_number_is_told(count) -> None:
+    told: list[tuple[int, int]] = []
+    items = [str(i) for i in range(count)]
+    results = in_order(Counting(), 2, int, items, lambda done, total: told.append((done, total)))
+    assert results == list(range(count))
+    assert told[0] == (0, count)
+    assert told[-1] == (count, count)
+    assert sorted(told) == told
+
+
 def test_a_lost_worker_is_told_in_a_line() -> None:
     with pytest.raises(InputError, match="a worker was lost"):
         list(outcomes(Breaking(), 1, int, [1]))
@@ -85,7 +99,7 @@ def test_what_is_not_installed_is_told_with_how_to_get_it() -> None:
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(tmp_path) -> None:
     pytest.importorskip("distributed")
     with (
-        patch("identify.fleet.engine.TIMEOUT", 0.5),
+        patch("twin.engine.TIMEOUT", 0.5),
         pytest.raises(InputError, match="no scheduler answers there"),
         cluster("tcp://127.0.0.1:1"),
     ):
@@ -100,6 +114,22 @@ def test_a_folder_that_is_not_there_is_told_in_a_line(tmp_path) -> None:
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory) -> Path:
     return recorded(tmp_path_factory.mktemp("floor") / "logs", machines=4, nights=6)
+
+
+@pytest.mark.slow
+def test_an_experiment_is_planned_the_same_here_on_workers_and_on_a_cluster(dask) -> None:
+    rivals = [CATALOGUE[name] for name in ("cogging", "force_constant_ripple")]
+
+    def planned(**on) -> list[tuple]:
+        made = plan(STAGE, between=rivals, axis="x", duration=4.0, **on)
+        return [(one.experiment, one.gain, one.difference, one.floor) for one in made.ranking]
+
+    here = planned()
+    assert len(here) > 10
+    with engine(workers=2) as workers:
+        assert planned(over=partial(in_order, *workers)) == here
+    with engine(dask.address) as workers:
+        assert planned(over=partial(in_order, *workers)) == here
 
 
 def contents(store: Path) -> dict[str, bytes]:
@@ -234,7 +264,7 @@ def test_a_scheduler_that_is_lost_is_told_in_a_line_and_the_store_is_read(
         if done == 4:
             dask.running[0].kill()
 
-    with pytest.raises(InputError, match="was lost; what was done is in the store"):
+    with pytest.raises(InputError, match="was lost; what a store holds is kept"):
         ingest(logs, store.root, MODELS, scheduler=dask.address, progress=progress)
     ((_, keys, _),) = ask(COUNT, store).rows
     assert 4 <= keys < 24

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import math
 import multiprocessing
 import os
 import signal
@@ -23,6 +24,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from functools import partial
 from itertools import islice
 from threading import Thread
 from types import ModuleType
@@ -30,11 +32,14 @@ from typing import TypeVar
 
 from twin.errors import InputError
 from twin.installed import pip_install
-from twin.parallel import cores
+from twin.parallel import Done, cores
 from twin.threads import VARIABLES
 
 T = TypeVar("T")
 R = TypeVar("R")
+SHARES = (
+    4  # tasks a worker that work is cut into: what is left at the end keeps one alone, a quarter
+)
 AHEAD = 4  # tasks a worker has waiting, so that none stands still while an answer travels
 TIMEOUT = 10.0  # s for a scheduler to answer
 RETRIES = 3  # of a task whose worker was lost
@@ -46,7 +51,7 @@ def needed(module: str) -> ModuleType:
         return importlib.import_module(module)
     except ImportError as error:
         raise InputError(
-            f"twin fleet needs the package {module.partition('.')[0]}; "
+            f"this needs the package {module.partition('.')[0]}; "
             f"install it with: {pip_install('fleet')}"
         ) from error
 
@@ -71,12 +76,41 @@ def outcomes(
                 yield one.result()
     except BrokenExecutor as error:
         raise InputError(
-            "a worker was lost, by a lack of memory or from outside; what was done is in the "
-            "store: give the same command again"
+            "a worker was lost, by a lack of memory or from outside; what a store holds is kept: "
+            "give the same command again"
         ) from error
     finally:
         for waiting in running:
             waiting.cancel()
+
+
+def in_order(
+    executor: Executor,
+    workers: int,
+    job: Callable[[T], R],
+    items: Iterable[T],
+    done: Done | None = None,
+) -> list[R]:
+    """What a job gives of each item, in their order: `twin.parallel.spread` over workers.
+
+    Several items go as one task, for what the job carries is sent with each task. done: told as
+    ``spread`` tells it, by this process, as tasks end.
+    """
+    given = list(items)
+    size = math.ceil(len(given) / (workers * SHARES)) or 1
+    tasks = [(k, given[k : k + size]) for k in range(0, len(given), size)]
+    made: dict[int, list[R]] = {}
+    tell = done or (lambda *_: None)
+    tell(0, len(given))
+    for first, results in outcomes(executor, workers, partial(_share, job), tasks):
+        made[first] = results
+        tell(sum(map(len, made.values())), len(given))
+    return [one for first, _ in tasks for one in made[first]]
+
+
+def _share(job: Callable[[T], R], task: tuple[int, list[T]]) -> tuple[int, list[R]]:
+    first, items = task
+    return first, [job(item) for item in items]
 
 
 @contextmanager
@@ -111,12 +145,12 @@ def cluster(address: str) -> Iterator[tuple[Executor, int]]:
         yield client.get_executor(retries=RETRIES), count
     except distributed.KilledWorker as error:
         raise InputError(
-            f"--scheduler {address}: a log has ended several workers, by a lack of memory or from "
-            "outside; what was done is in the store: give the workers more memory"
+            f"--scheduler {address}: a task has ended several workers, by a lack of memory or from "
+            "outside; what a store holds is kept: give the workers more memory"
         ) from error
     except (OSError, TimeoutError, CancelledError) as error:
         raise InputError(
-            f"--scheduler {address}: was lost; what was done is in the store: start it and give "
+            f"--scheduler {address}: was lost; what a store holds is kept: start it and give "
             "the same command again"
         ) from error
     finally:
