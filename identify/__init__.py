@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from typing import Any
 
     from identify.adding import *
+    from identify.output.as_json import load
     from identify.workflow import *
 
 __all__ = [
     "Addition", "Agreement", "AllAdded", "Comparison", "CorrectedBody", "Diagnosis", "Feedforward",
     "FitResult", "FrequencyResponse", "SimulationFit", "add", "add_found", "add_shape", "agree",
     "compare", "correct_body", "diagnose", "feedforward", "first_model", "fit", "fit_simulation",
-    "frequency_response", "plan",
+    "frequency_response", "load", "plan",
 ]  # fmt: skip
 
 
@@ -29,6 +30,10 @@ def __getattr__(name: str) -> Any:
     """The calls, loaded with the first of them: `twin --help` needs none."""
     if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    if name == "load":
+        from identify.output import as_json
+
+        return as_json.load
     from identify import adding, workflow
 
     return getattr(adding if hasattr(adding, name) else workflow, name)

@@ -132,25 +132,25 @@ def cluster(address: str) -> Iterator[tuple[Executor, int]]:
         client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            f"--scheduler {address}: no scheduler answers there; start one with `dask scheduler` "
-            "and workers with `dask worker ADDRESS --nthreads 1`"
+            f"scheduler {address}: none answers there; start one with `dask scheduler`, and "
+            "workers of one thread with `dask worker`"
         ) from error
     try:
         count = sum(client.nthreads().values())
         if not count:
             raise InputError(
-                f"--scheduler {address}: has no workers; start them with `dask worker {address} "
-                "--nthreads 1`"
+                f"scheduler {address}: has no workers; start some of one thread with "
+                f"`dask worker {address}`"
             )
         yield client.get_executor(retries=RETRIES), count
     except distributed.KilledWorker as error:
         raise InputError(
-            f"--scheduler {address}: a task has ended several workers, by a lack of memory or from "
+            f"scheduler {address}: a task has ended several workers, by a lack of memory or from "
             "outside; what a store holds is kept: give the workers more memory"
         ) from error
     except (OSError, TimeoutError, CancelledError) as error:
         raise InputError(
-            f"--scheduler {address}: was lost; what a store holds is kept: start it and give "
+            f"scheduler {address}: was lost; what a store holds is kept: start it and give "
             "the same command again"
         ) from error
     finally:

@@ -31,6 +31,7 @@ from identify.experiment_design.rival_hypotheses import (
     require_different,
     simulated_dataset,
 )
+from identify.printed import Printed
 from identify.rules import RULE
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added
@@ -49,8 +50,8 @@ from twin.parallel import Progress, Spread, parallel, silent, spread, within
 DURATION = 20.0  # s of a planned experiment
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Printed):
     """The experiment that decides, and those that it was chosen from.
 
     axis: the axis that is explained. between: names of the explanations; a single one where the

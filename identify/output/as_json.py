@@ -40,6 +40,30 @@ def json_of(result: Any, **more: Any) -> dict[str, Any]:
     return answer_of(result, **more).entries()
 
 
+def save(result: Any, path: Path) -> None:
+    """Write the object that the command of a result prints, whole or not at all."""
+    text = json.dumps(json_of(result), indent=1, ensure_ascii=False)
+    write_atomically(path, f"{text}\n".encode())
+
+
+def load(path: Path | str) -> Answer:
+    """The answer that a file holds, of ``save`` or of a command with ``--json``.
+
+    Its entries are attributes under the names that the JSON has; it is equal to the answer that was
+    written. Raises InputError, in one line, where the file holds none.
+    """
+    try:
+        entries = json.loads(Path(path).read_text(encoding="utf-8"))
+        kinds = {_place(kind): kind for kind in answers()}
+        return kinds[entries["schema"]].model_validate(entries, by_alias=False, by_name=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise InputError(
+            f"{path}: is no answer of this version; give what `save` or a command with --json wrote"
+        ) from error
+
+
 def found_in(path: Path, given: MachineModel, catalogue: Catalogue) -> MachineModel:
     """The model with all that a diagnosis of a model found, of the file of its saved answer.
 

@@ -11,7 +11,7 @@ from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.frequency.plant import Banded, Plant
 from identify.output import INKS
 from identify.output.numbers import listed, number, percent, pretty, with_band
-from identify.results import figure_of, text_of
+from identify.printed import figure_of, text_of
 from identify.results.frequency import FrequencyResponse, by_source
 from twin.model.units import AxisUnits
 

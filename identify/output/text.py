@@ -49,7 +49,7 @@ from identify.output.words.next_step import (
 )
 from identify.output.words.recording import read_otherwise_in_words
 from identify.output.words.verdict import all_found, named_in_words
-from identify.results import figure_of, html_of, report_of, text_of
+from identify.printed import Printed, figure_of, html_of, report_of, save_of, text_of
 from identify.results.results import (
     Addition,
     AllAdded,
@@ -338,6 +338,13 @@ def _page(result: Comparison | Diagnosis, path: Path) -> None:
     from identify.output.report.subject import Subject
 
     write_report(path, Subject.of(result))
+
+
+@save_of.register(Printed)
+def _json(result: Printed, path: Path) -> None:
+    from identify.output.as_json import save  # whose classes take a tenth of a second
+
+    save(result, path)
 
 
 @figure_of.register(Comparison | Diagnosis)

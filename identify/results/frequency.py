@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
-from identify.results import Printed, figure_of
+from identify.printed import Printed, figure_of
 from twin.files import write_atomically
 from twin.signals import Array
 
@@ -32,9 +32,6 @@ class FrequencyResponse(Printed):
 
     logs: tuple[str, ...]
     axes: Mapping[str, AxisFrequency]
-
-    def __repr__(self) -> str:
-        return f"<FrequencyResponse of {', '.join(self.axes)}; print it to read it>"
 
     def plot(self) -> Figure:
         """The Bode diagram of each axis."""

@@ -20,7 +20,7 @@ from identify.estimation.offered import NotTried
 from identify.estimation.simulated_motion import MotionFit
 from identify.experiment_design.plan import Plan
 from identify.mechanism.bodies import WrongBody, corrected
-from identify.results import Pictured, Printed
+from identify.printed import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
 from identify.selection.acceptance import left_on
 from identify.selection.candidates import Candidate

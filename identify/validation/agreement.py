@@ -22,6 +22,7 @@ from identify.estimation.force_balance import residual
 from identify.estimation.intervals import BLOCKS, QUANTILE
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.variable_projection import usable
+from identify.printed import Printed
 from identify.rules import RULE
 from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
@@ -100,8 +101,8 @@ class AxisAgreement:
         return max(self.above_floor) > RULE.at_floor
 
 
-@dataclass(frozen=True)
-class Agreement:
+@dataclass(frozen=True, repr=False)
+class Agreement(Printed):
     """Two fits, axis by axis. not_compared: axes without intervals in one of them."""
 
     axes: Mapping[str, AxisAgreement]

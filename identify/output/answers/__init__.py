@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import singledispatch
+from keyword import iskeyword
+from math import isfinite
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, Self
@@ -22,14 +24,20 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     field_validator,
     model_serializer,
+    model_validator,
 )
 from pydantic_core import to_jsonable_python
 
 SCHEMA = "answers-1"  # the number grows when an entry goes, or gets another meaning
-Number = float | None  # null: not a number, infinite, or none
+Number = Annotated[float | None, BeforeValidator(lambda v: v if _is_number(v) else None)]
+"""Null: not a number, infinite, or none."""
 File = Annotated[str, BeforeValidator(lambda v: str(v) if isinstance(v, Path) else v)]  # as typed
 LOWER = BeforeValidator(str.lower)  # of the name of an enum's member
 Told = Annotated[str | None, BeforeValidator(lambda v: v or None)]  # null: there is nothing to tell
+
+
+def _is_number(value: Any) -> bool:
+    return not isinstance(value, float) or isfinite(value)
 
 
 def read(path: str) -> Any:
@@ -52,6 +60,14 @@ class Entry(BaseModel):
         from_attributes=True, extra="forbid", validate_by_name=True, validate_by_alias=True,
         json_schema_serialization_defaults_required=True, use_attribute_docstrings=True,
     )  # fmt: skip
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_json(cls, value: Any) -> Any:
+        """An object that was read: less its place in the schema; `or` is no name in Python."""
+        if isinstance(value, dict):
+            return {f"{k}_" if iskeyword(k) else k: v for k, v in value.items() if k != "schema"}
+        return value
 
     @field_validator("*", mode="before")
     @classmethod

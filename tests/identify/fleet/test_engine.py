@@ -100,7 +100,7 @@ def test_a_scheduler_that_is_not_there_is_told_in_a_line(tmp_path) -> None:
     pytest.importorskip("distributed")
     with (
         patch("twin.engine.TIMEOUT", 0.5),
-        pytest.raises(InputError, match="no scheduler answers there"),
+        pytest.raises(InputError, match="none answers there"),
         cluster("tcp://127.0.0.1:1"),
     ):
         pass

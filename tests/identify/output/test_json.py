@@ -21,18 +21,21 @@ from jsonschema import Draft202012Validator, ValidationError
 from report_cases import cogging_case
 from strict_json import shipped, strict, told, valid
 
+import identify
 from identify.estimation.fit import Outcome
 from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
-from identify.output.answers import Answer, plain
+from identify.output.answers import Answer, answer_of, plain
 from identify.output.answers.machine import EffectAnswer, check_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
+from identify.printed import Printed, text_of
 from identify.results.results import CorrectedBody
 from identify.selection.diagnosis import Verdict
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, LogFinding, Severity
 from twin.checks.report import Place
 from twin.curve import Coordinate
+from twin.errors import InputError
 from twin.laws import verdict
 
 KEPT = Path(__file__).with_name("answers.json")
@@ -133,6 +136,36 @@ def test_an_object_is_as_it_was_read_and_as_the_schema_says(name: str) -> None:
     found = printed(name)
     assert rounded(found) == json.loads(KEPT.read_text(encoding="utf-8"))[name]
     valid(found)
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_answer_comes_back_from_its_file_as_it_was(name: str, tmp_path: Path) -> None:
+    found, file = ANSWERS[name](), tmp_path / "answer.json"
+    if isinstance(found, Printed):
+        found.save(file)
+        assert identify.load(file) == answer_of(found)
+    else:
+        file.write_text(json.dumps(printed(name)), encoding="utf-8")
+    assert strict(identify.load(file).entries()) == printed(name)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"schema": "answers-1#/$defs/FitAnswer"}', None])
+def test_what_is_no_answer_is_told_in_a_line(text: str | None, tmp_path: Path) -> None:
+    file = tmp_path / "answer.json"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"^\S*answer\.json: (is no answer|cannot be read)"
+    ) as told:
+        identify.load(file)
+    assert "\n" not in str(told.value)
+
+
+def test_plans_and_comparisons_of_fits_print_themselves() -> None:
+    of_fits = Agreement({"x": made.SAME, "y": made.OTHER}, ("z",))
+    for result in (made.plan_of("cogging", "wear"), of_fits):
+        assert str(result) == text_of(result)
+        assert len(repr(result)) < 80
 
 
 def test_the_text_of_a_mujoco_file_is_told_where_a_body_is_another_alone() -> None:

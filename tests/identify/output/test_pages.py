@@ -24,7 +24,7 @@ from identify.estimation.intervals import refusal
 from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.page import page
 from identify.output.report.subject import Subject
-from identify.results import Printed
+from identify.printed import Printed
 from identify.results.results import Comparison, Diagnosis, OnMachine
 from identify.selection.diagnosis import Verdict
 
