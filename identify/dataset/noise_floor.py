@@ -191,11 +191,14 @@ THROUGHOUT = 0.99  # of the weight of a test function: all of it but for roundin
 
 
 def _of_path(axis: AxisModel, log: PreparedLog) -> float:
-    """Mean square, N^2, of what laws with memory make of what the readings tell of their path.
+    """Mean square, N^2, of what laws with memory make of what the readings do not tell of a path.
 
-    As they differ along the path that every second reading tells: of noise that is its error, of
-    what lies between the samples more than it. Not where the axis stands, as what they hold there
-    balances the force.
+    By the two paths that every second reading tells, from the first and from the second on. Half
+    of what laws differ by along them is the readings' noise, as it is in the path of all readings.
+    By what their mean differs from that of all readings, paths miss what lies between: a reversal
+    is missed by the square of the sample period, so that all readings miss a third of it
+    (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911)). Not where the axis stands, as what they
+    hold there balances the force.
     """
     motion = log.motion
     own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
@@ -203,10 +206,14 @@ def _of_path(axis: AxisModel, log: PreparedLog) -> float:
         return 0.0
     rests = log.test_function.mean(motion.path.stands.astype(float)) > THROUGHOUT
     told = moving([log], sticks(axis)) & ~rests
+    if not told.any():
+        return 0.0
     table = on_blocks(own)
-    coarse = replace(motion, path=motion.path.of_every_second())
-    apart = log.test_function.mean(total_force(table, motion) - total_force(table, coarse))
-    return float(np.mean(apart[told] ** 2)) if told.any() else 0.0
+    paths = (motion.path, motion.path.of_every_second(0), motion.path.of_every_second(1))
+    every, one, other = (total_force(table, replace(motion, path=path)) for path in paths)
+    noise = log.test_function.mean(0.5 * (one - other))[told]
+    missed = log.test_function.mean(0.5 * (one + other) - every)[told] / 3.0
+    return float(np.mean(noise**2 + missed**2))
 
 
 def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:

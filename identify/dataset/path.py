@@ -92,10 +92,10 @@ class Path:
         """The path behind readings with an error (n * samples,) m."""
         return replace(self, readings=self.readings - np.append(error, error[-1]))
 
-    def of_every_second(self) -> Path:
-        """The path that every second reading tells, and nothing between."""
-        fewer = self.readings.copy()
-        fewer[1:-1:2] = 0.5 * (fewer[:-2:2] + fewer[2::2])
+    def of_every_second(self, first: int) -> Path:
+        """The path that every second reading tells, from the first or the second (0, 1) on."""
+        fewer, between_them = self.readings.copy(), slice(1 + first, -1, 2)
+        fewer[between_them] = 0.5 * (fewer[first:-2:2] + fewer[2 + first :: 2])
         return replace(self, readings=fewer)
 
     def forget(self) -> None:

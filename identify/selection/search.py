@@ -20,7 +20,6 @@ from identify.estimation.alignment import begun_at, realigned, synchronised, tim
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, least_t, prefers, score
@@ -36,6 +35,7 @@ from identify.selection.changes import (
     in_simplest_values,
 )
 from identify.selection.controls import ControlTest
+from identify.selection.held import is_held
 from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.trying import (
     LEADERS,
@@ -432,14 +432,6 @@ def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
     return plain.accepted and replace(plain, control=control(change, without, fit)).accepted
 
 
-def _is_held(change: Change, without: Judged, fit: Judged) -> bool:
-    """Whether a fit without a change can make its force all the same, by a free curve."""
-    own = np.concatenate(change.columns(without, fit)[0](without.dataset.training))[
-        without.fit.kept
-    ]
-    return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < RULE.least_fall * np.sum(own**2))
-
-
 def _less_replaced(
     judged: Judged, steps: tuple[Step, ...], first: Judged
 ) -> tuple[Judged, tuple[Step, ...]]:
@@ -477,8 +469,7 @@ def _needed(
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = refitted_on(axis, judged)
-            curve = isinstance(steps[-1].change, Reshaped) and not step.with_others
-            if curve and _is_held(step.change, without, judged):
+            if not step.with_others and is_held(step.change, steps[-1].change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
             needed = _is_needed(step.change, without, judged)

@@ -152,3 +152,15 @@ def test_a_spring_that_turns_as_the_weight_does_is_no_doubt_beside_all_bodies():
     assert try_effect(found.fits[joint], known, spring).doubt is None
     alone = replace(known, beside_bodies=False)
     assert "weigh" in try_effect(found.fits[joint], alone, spring).doubt.why
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [7, 19])
+def test_the_soft_friction_of_a_light_joint_is_no_late_motor_and_no_other_joints(number):
+    """A lag (91 %) and a friction by another joint (82 %) were told of a friction alone."""
+    own = machine(105, number)
+    logs = [{f"{i}": log_of(own.arm, own.changed, 1000 * own.number + i)} for i in range(3)]
+    model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", own.arm.text))
+    found = diagnose(model, *logs, catalogue=CATALOGUE)
+    told = {f.effect for axis in found.axes.values() for f in axis.findings}
+    assert told <= {"coulomb_viscous"}
