@@ -82,10 +82,13 @@ def _steady(axis: Axis) -> Iterator[LogFinding]:
 def _takes_off(axis: Axis, before: float, after: float, times: float) -> bool:
     """Whether a lag takes off so many times as much (N rms) as it leaves beside the noise.
 
-    What another effect leaves, as a ripple or backlash, is in part explained by a lag too.
+    What another effect leaves, as a ripple or backlash, is in part explained by a lag too. And more
+    than the noise of the readings makes of the force that accelerates: a loop answers that noise a
+    moment later, which is no lag.
     """
     noise = axis.smoother.held_noise(axis.force_noise)
-    return before**2 - after**2 > times**2 * max(after**2 - noise**2, 0.0)
+    answered = (axis.dynamics.mass or 0.0) * axis.smoother.acceleration_noise(axis.position_noise)
+    return before**2 - after**2 > max(times**2 * (after**2 - noise**2), answered**2)
 
 
 def _lag(axis: Axis, signal: Array, other: Array) -> float:

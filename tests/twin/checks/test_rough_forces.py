@@ -60,3 +60,10 @@ def test_a_rough_force_that_is_clipped_is_told(log, part):
     assert said
     assert all("the force stays at its extreme of" in s for s in said)
     assert not told(log, Fault.SATURATION)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_a_loop_answers_of_rounded_readings_is_no_lag(seed):
+    """The command answers the rounding a moment later, which looked like 3 to 4.5 ms ahead."""
+    sines = recordings(SERVO, SERVO.plant, Recorder(1000, 1000), seed, None, "")["sines"]
+    assert not told(sines, Fault.LAG)
