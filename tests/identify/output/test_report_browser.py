@@ -266,3 +266,62 @@ def test_a_spike_is_beyond_the_range_on_which_the_charts_open(
     assert opened[:2] == pytest.approx(usual[:2], rel=2.0)  # three times what is usual
     assert re.search(r"\d+ dots are beyond, from .* to ", opened[2])
     assert "beyond" not in usual[2]
+
+
+def drag(page: Browser, place: str, first: tuple[float, float], last: tuple[float, float]) -> None:
+    """Drag in a plot from one part of its width and height to another."""
+    left, top, width, height = page.run(f"""const b = document.querySelector("#{place} .u-over");
+      scrollTo(0, scrollY + b.getBoundingClientRect().top - 100);
+      const c = b.getBoundingClientRect(); return [c.left, c.top, c.width, c.height];""")
+    moves = [("Moved", first), ("Pressed", first), ("Moved", last), ("Released", last)]
+    for kind, (right, down) in moves:
+        page.call(
+            "Input.dispatchMouseEvent", type=f"mouse{kind}", button="left", clickCount=1,
+            x=left + right * width, y=top + down * height,
+        )  # fmt: skip
+    page.run("await frame()")
+
+
+MARKS = """const pink = id => {
+  const c = document.querySelector(`#${id} canvas`);
+  const own = new OffscreenCanvas(c.width, c.height).getContext("2d", {willReadFrequently: true});
+  own.drawImage(c, 0, 0);
+  const p = own.getImageData(0, 0, c.width, c.height).data;
+  let n = 0;
+  for (let i = 0; i < p.length; i += 4)
+    if (p[i] > 190 && p[i + 1] < 0.85 * p[i] && p[i + 2] > p[i + 1]) n++;
+  return n;
+};
+return {seen: ["forces", "left", "motion", "coordinate", "map-plot"].map(pink),
+  note: text("mark-note"), zoom: span("left"),
+  cleared: document.getElementById("mark-none").disabled};"""
+
+
+def test_what_is_marked_in_one_plot_is_marked_in_all_and_told(page: Browser) -> None:
+    clear = page.run(MARKS)
+    assert clear["note"] == ""
+    assert clear["cleared"]
+    page.run('document.getElementById("mark").click()')
+    for place, first, last in (
+        ("coordinate", (0.4, 0.05), (0.6, 0.95)), ("left", (0.2, 0.5), (0.3, 0.5)),
+        ("map-plot", (0.4, 0.05), (0.7, 0.9)),
+    ):  # fmt: skip
+        drag(page, place, first, last)
+        marked = page.run(MARKS)
+        assert marked["zoom"] == clear["zoom"]
+        assert all(n > m for n, m in zip(marked["seen"], clear["seen"], strict=True)), place
+        said = re.fullmatch(
+            r"Marked in all plots: \d+ test functions, ([\d.]+) % of all, with ([\d.]+) % of the "
+            r"squared .*, from [\d.]+ s of .* to [\d.]+ s of .*\.", marked["note"],
+        )  # fmt: skip
+        assert said, marked["note"]
+        assert 0.0 < float(said[1]) < 60.0
+    page.run('document.getElementById("mark-largest").click()')
+    said = re.search(r"([\d.]+) % of all, with ([\d.]+) %", page.run('return text("mark-note")'))
+    assert float(said[1]) == pytest.approx(5.0, abs=0.3)
+    assert float(said[2]) > 15.0
+    page.run('document.getElementById("mark-none").click()')
+    assert page.run(MARKS) == clear
+    page.run('document.getElementById("mark").click()')
+    drag(page, "left", (0.2, 0.5), (0.3, 0.5))
+    assert page.run('return span("left")') != pytest.approx(clear["zoom"])

@@ -3,7 +3,7 @@
 "use strict";
 (() => {
 const INK = "#1b2a38", SOFT = "#5b6875", GRID = "#e3e8ed", FLOOR = "rgba(120,135,150,.22)";
-const BEFORE = "#2f6db3", AFTER = "#b4530f", MEASURED = "#7b8794";
+const BEFORE = "#2f6db3", AFTER = "#b4530f", MEASURED = "#7b8794", MARK = "#c2185b";
 const COLORS = ["#2e7d32", "#8e24aa", "#00838f", "#c2185b", "#8a5a00", "#3949ab", "#5d4037", "#00695c"];
 const RAMP = ["#e6edf4", "#b5d0e8", "#7fb0d8", "#4a8ac2", "#2660a0", "#123a70", "#071a3a"];
 const $ = id => document.getElementById(id);
@@ -23,6 +23,7 @@ const usual = values => {
   const [first, low, high, last] = [0, 0.05, 0.95, 1].map(at), width = high - low;
   return width > 0 && last - first > 5 * width ? [Math.max(first, low - width), Math.min(last, high + width)] : [first, last];
 };
+const within = (v, [low, high]) => v >= low && v <= high;
 const padded = (low, high) => {
   const more = 0.05 * (high - low) || Math.abs(low) || 1;
   return [low - more, high + more];
@@ -52,8 +53,8 @@ const line = (name, color, unit, more) => ({label: name, stroke: color, width: 1
 
 function rectangle(u, left, right, low, high, color) {
   const [x0, x1] = [left, right].map(v => v == null ? null : u.valToPos(v, "x", true));
-  const [y0, y1] = [low, high].map(v => u.valToPos(v, "y", true));
   const {left: l, top: t, width: w, height: h} = u.bbox;
+  const [y0, y1] = [low, high].map((v, i) => v == null ? t + (1 - i) * h : u.valToPos(v, "y", true));
   const a = Math.max(x0 ?? l, l), b = Math.min(x1 ?? l + w, l + w);
   const c = Math.max(y1, t), d = Math.min(y0, t + h);
   u.ctx.fillStyle = color;
@@ -99,6 +100,7 @@ class Axis {
 
 if (data.length) {
   let axis, plots = [], range = null, waiting = false, busy = false;
+  let marked = null;  // 1 for each of the axis' test functions that is marked; null where none is
   const axes = data.map(given => new Axis(given));
   const choices = (id, pairs, chosen) => {
     const select = $(id);
@@ -121,7 +123,8 @@ if (data.length) {
 
   function choose(name) {
     axis = axes.find(a => a.name === name);
-    range = null;
+    range = marked = null;
+    told();
     choices("axis", axes.map(a => [a.name, a.name]), name);
     choices("show", [["residual", axis.texts.residual], ["force", axis.texts.force], ...names(axis.effects)], "residual");
     choices("against", [["time", "Time"], ...names(axis.coordinates)], axis.against);
@@ -152,11 +155,12 @@ if (data.length) {
     const boxes = [...$("toggles").querySelectorAll("input")];
     const common = {
       x: {label: "Time", value: (u, v) => v == null ? "–" : `${digits(v - axis.logAt(v).begin)} s of ${axis.logAt(v).title}`},
-      cursor: {sync: {key: "time", setSeries: false}, drag: {x: true, y: false}, points: {size: 6}},
+      cursor: {sync: {key: "time", setSeries: false}, drag: {x: true, y: false, setScale: !$("mark").checked}, points: {size: 6}},
     };
     const hooks = {
+      setSelect: [u => dragged(u, ([low, high]) => i => axis.x[i] >= low && axis.x[i] <= high)],
       setScale: [(u, key) => key === "x" && !busy && zoomed(u.scales.x.min, u.scales.x.max)],
-      draw: [u => axis.logs.slice(1).forEach(log => {
+      draw: [u => stripes(u), u => axis.logs.slice(1).forEach(log => {
         const at = u.valToPos(log.begin, "x", true);
         if (at < u.bbox.left || at > u.bbox.left + u.bbox.width) return;
         u.ctx.fillStyle = SOFT, u.ctx.fillRect(at, u.bbox.top, 1, u.bbox.height);
@@ -182,6 +186,55 @@ if (data.length) {
     plots[2] = plot($("motion"), {...common, hooks, height: 240, labels: ["Time (s), log after log", label(s)],
       series: [line(s.label, INK, s.unit)]}, [axis.x, axis.values(name)]);
     plots[2].again = () => motion(common, hooks);
+  }
+
+  // --- test functions marked in one plot, and so in all -------------------------------------
+
+  function dragged(u, of) {  // of: ranges of x and y -> index -> whether it is in them
+    const {left, top, width, height} = u.select;
+    if (!$("mark").checked || busy || !(width > 0)) return;
+    const tall = height > 0 && height < u.over.clientHeight;
+    const along = [u.posToVal(left, "x"), u.posToVal(left + width, "x")];
+    const across = tall ? [u.posToVal(top + height, "y"), u.posToVal(top, "y")] : [-Infinity, Infinity];
+    u.setSelect({left: 0, top: 0, width: 0, height: 0}, false);
+    mark(of(along, across));
+  }
+  function mark(accepts) {
+    const [a, b] = part(), left = axis.values("before");
+    marked = new Uint8Array(axis.x.length);
+    for (let i = a; i < b; i++) marked[i] = left[i] != null && accepts(i) ? 1 : 0;
+    if (!marked.includes(1)) marked = null;
+    told();
+  }
+  function largest() {  // the twentieth of the test functions in view that err most
+    const [a, b] = part(), left = axis.values("before");
+    const sizes = left.slice(a, b).filter(v => v != null).map(Math.abs).sort((u, v) => u - v);
+    const least = sizes[Math.floor(0.95 * sizes.length)];
+    mark(i => Math.abs(left[i]) >= least);
+  }
+  function told() {  // what is marked, in words and in every plot
+    const left = axis.values("before"), sum = i => left[i] == null ? 0 : left[i] * left[i];
+    let count = 0, all = 0, error = 0, whole = 0, first = null, last = null;
+    for (let i = 0; i < left.length; i++) {
+      if (left[i] == null) continue;
+      all++, whole += sum(i);
+      if (marked?.[i]) count++, error += sum(i), first ??= axis.x[i], last = axis.x[i];
+    }
+    const at = v => `${digits(v - axis.logAt(v).begin)} s of ${axis.logAt(v).title}`;
+    $("mark-none").disabled = !count;
+    $("mark-note").textContent = count ? `Marked in all plots: ${count} test functions, ${digits(100 * count / all)} % of all, with `
+      + `${digits(100 * error / whole)} % of the squared ${title("before")}, from ${at(first)} to ${at(last)}.` : "";
+    for (const place of [$("forces"), $("left"), $("motion"), $("coordinate"), $("map-plot")]) place.shown?.redraw(false);
+  }
+  function stripes(u) {
+    if (!marked) return;
+    const x = axis.x, [low, high] = [u.scales.x.min, u.scales.x.max], least = (high - low) / u.bbox.width;
+    for (let i = 0; i < x.length; i++) {
+      if (!marked[i] || x[i] > high) continue;
+      const first = i;
+      while (marked[i + 1]) i++;
+      if (x[i] >= low) rectangle(u, x[first] - least, x[i] + least, null, null, "rgba(194,24,91,.30)");
+    }
   }
 
   function zoomed(low, high) {
@@ -251,9 +304,10 @@ if (data.length) {
     const beyond = every.filter(v => v != null && (v < bounds[0] || v > bounds[1])).length;
     const u = plot($("coordinate"), {
       height: 390, labels: [label(along), `${what === "residual" ? axis.texts.residual : axis.texts.force} (${unit})`],
-      x: {label: along.label, value: withUnit(along.unit)}, series: lines, cursor: {drag: {x: true, y: true, uni: 12}},
+      x: {label: along.label, value: withUnit(along.unit)}, series: lines, cursor: {drag: {x: true, y: true, uni: 12, setScale: !$("mark").checked}},
       scales: {y: {range: () => bounds}},
-      hooks: {drawClear: [u => {
+      hooks: {setSelect: [u => dragged(u, (along, across) => i => within(x[i], along) && dots.some(d => d[i] != null && within(d[i], across)))],
+        drawClear: [u => {
         if (floor) rectangle(u, null, null, -floor, floor, FLOOR);
         const {left: l, top: t, width: w, height: h} = u.bbox, size = b - a > 8000 ? 2 : 3, ctx = u.ctx;
         group.forEach(([, color], g) => {
@@ -264,6 +318,15 @@ if (data.length) {
             if (px >= l && px <= l + w && py >= t && py <= t + h) ctx.fillRect(px - size / 2, py - size / 2, size, size);
           }
         });
+        ctx.fillStyle = MARK, ctx.globalAlpha = 0.8;
+        for (let i = a; marked && i < b; i++) {
+          if (!marked[i] || x[i] == null) continue;
+          for (const dot of dots) {
+            if (dot[i] == null) continue;
+            const px = u.valToPos(x[i], "x", true), py = u.valToPos(dot[i], "y", true);
+            if (px >= l && px <= l + w && py >= t && py <= t + h) ctx.fillRect(px - size, py - size, 2 * size, 2 * size);
+          }
+        }
         ctx.globalAlpha = 1;
       }]},
     }, [[low, ...at, high === low ? low + 1 : high], ...values]);
@@ -293,13 +356,22 @@ if (data.length) {
     const color = v => RAMP[v <= axis.floor ? 0 : Math.min(1 + Math.floor(steps * Math.log(v / axis.floor) / Math.log(top / axis.floor)), steps)];
     plot($("map-plot"), {
       height: 320, labels: [label(axis.of(nx)), label(axis.of(ny))], legend: {show: false},
-      x: {}, series: [{stroke: "transparent"}], cursor: {drag: {x: true, y: true, uni: 12}},
+      x: {}, series: [{stroke: "transparent"}], cursor: {drag: {x: true, y: true, uni: 12, setScale: !$("mark").checked}},
       scales: {y: {range: () => [y0, y0 + rows * dy]}},
       hooks: {
         draw: [u => error.forEach((v, k) => {
           const i = k % columns, j = Math.floor(k / columns);
           if (v != null) rectangle(u, x0 + i * dx, x0 + (i + 1) * dx, y0 + j * dy, y0 + (j + 1) * dy, color(v));
-        })],
+        }), u => {
+          const cells = new Set();
+          for (let i = a; marked && i < b; i++) if (marked[i] && x[i] != null && y[i] != null) cells.add(cell(x[i], y[i]));
+          u.ctx.strokeStyle = MARK, u.ctx.lineWidth = 2;
+          for (const k of cells) {
+            const [i, j] = [k % columns, Math.floor(k / columns)], px = v => u.valToPos(v, "x", true), py = v => u.valToPos(v, "y", true);
+            u.ctx.strokeRect(px(x0 + i * dx), py(y0 + (j + 1) * dy), px(x0 + dx) - px(x0), py(y0) - py(y0 + dy));
+          }
+        }],
+        setSelect: [u => dragged(u, (along, across) => i => x[i] != null && y[i] != null && within(x[i], along) && within(y[i], across))],
         setCursor: [u => {
           const at = [u.posToVal(u.cursor.left, "x"), u.posToVal(u.cursor.top, "y")], k = cell(...at);
           $("map-value").textContent = u.cursor.left >= 0 && count[k]
@@ -312,6 +384,11 @@ if (data.length) {
   }
 
   const on = (id, job) => $(id).addEventListener("change", job);
+  on("mark", () => {
+    for (const place of [$("forces"), $("left"), $("motion"), $("coordinate"), $("map-plot")]) place.shown.cursor.drag.setScale = !$("mark").checked;
+  });
+  $("mark-largest").addEventListener("click", largest);
+  $("mark-none").addEventListener("click", () => { marked = null; told(); });
   on("axis", () => choose($("axis").value));
   on("show", coordinate), on("apart", coordinate);
   on("against", () => { plots[2].again(); if (range) plots[2].setScale("x", {min: range[0], max: range[1]}); coordinate(); });
