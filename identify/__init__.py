@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Addition", "Agreement", "AllAdded", "Comparison", "CorrectedBody", "Diagnosis", "Feedforward",
-    "FitResult", "FrequencyResponse", "SimulationFit", "add", "add_found", "add_shape", "agree",
-    "compare", "correct_body", "diagnose", "feedforward", "first_model", "fit", "fit_simulation",
-    "frequency_response", "load", "plan",
+    "FitResult", "FrequencyResponse", "Removal", "SimulationFit", "add", "add_found", "add_shape",
+    "agree", "compare", "correct_body", "diagnose", "feedforward", "first_model", "fit",
+    "fit_simulation", "frequency_response", "load", "plan", "remove",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Grow a model by what it lacks: one effect, the shape of one, a body, or all that was found."""
+"""Grow a model by one effect, the shape of one, a body, or all that was found; or take one out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from identify.results.results import (
     Addition,
     AllAdded,
     CorrectedBody,
+    Removal,
     addition,
+    removal,
     step_of_body,
     steps_together,
 )
@@ -198,6 +200,40 @@ def correct_body(
     bodies = found.bodies_beside(found.fits, found.datasets)
     made = corrected(before.model, bodies, found.fits, file)
     return CorrectedBody(made, before.model, bodies)
+
+
+@parallel()
+def remove(
+    effect: str,
+    model: Model,
+    logs: GivenLogs,
+    holdout: GivenLogs | None = None,
+    test: GivenLogs | None = None,
+    *,
+    axis: str | None = None,
+    test_function: float | None = None,
+    progress: Progress = silent,
+) -> Removal:
+    """Take an effect out of an axis, refit the others, and record the errors with it and without.
+
+    effect: its name in the model. axis: needed where several have it. Raises InputError where no
+    axis has it, or several have.
+    """
+    model = as_model(model)
+    names = [axis] if axis else list(model.axes)
+    having = [name for name in names if effect in model.axis(name).names]
+    if len(having) != 1:
+        known = {n: ", ".join(model.axes[n].names) for n in names}
+        told = "; ".join(f"axis {n} has {effects or 'none'}" for n, effects in known.items())
+        which = f"several axes have it: give one of {', '.join(having)}" if having else told
+        raise InputError(f"{effect}: cannot be taken out; {which}")
+    name = having[0]
+    before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
+    require_moving(name, before.fits)
+    progress("taking it out", 0, 1)
+    dataset, own = before.datasets[name], before.fits[name]
+    less = replace(fit_axis(own.axis.without(effect), dataset.training), begun=own.begun)
+    return removal(effect, before.model, own, less, dataset)
 
 
 def _with_notes(made: Addition, *first: str | None) -> Addition:

@@ -17,6 +17,7 @@ ALLOWED: Mapping[str, frozenset[str]] = {
     "compare": frozenset(),
     "diagnose": frozenset(),
     "add": frozenset({"--axis", "--found", "--shape"}),
+    "remove": frozenset({"--axis"}),
     "plan": frozenset({"--between", "--axis", "--duration"}),
     "simulate": frozenset({"--setpoints", "--seed"}),
     "view": frozenset({"--html"}),

@@ -272,6 +272,32 @@ def add(
     return replace(said, unwritten=failed)
 
 
+@app.command()
+def remove(
+    effect: Annotated[str, Argument(metavar="EFFECT", help="Its name in the model.")],
+    model: Model,
+    logs: FitLogs,
+    out: Annotated[Path, written("Model without the effect.")],
+    holdout: Holdout = None,
+    test: Test = None,
+    axis: Annotated[str | None, Option(help="Axis; needed where several have it.")] = None,
+    test_function: TestFunction = None,
+    effects: Effects = None,
+) -> Said:
+    """Take an effect out, refit the others, and record the error with it and without.
+
+    Example: twin remove wear better.toml fit.mcap --holdout held.mcap -o without.toml
+    """
+    from identify import adding
+
+    machine, _ = loaded(model, effects)
+    job = partial(adding.remove, effect, axis=axis, test_function=test_function)
+    done = with_logs(job, machine, logs, holdout, test, fits=True)
+    failed = tried(partial(_save_with_bodies, done.result.model, out, machine))
+    said = said_of(done.result, done.warnings, left_out=done.left_out)
+    return replace(said, unwritten=failed)
+
+
 def _copy_of(machine: MachineModel, out: Path) -> Path:
     """The MuJoCo file beside a model that is written; InputError where it is the user's own."""
     file = out.with_suffix(".xml")

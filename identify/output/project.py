@@ -42,6 +42,8 @@ def model_made(model: ModelEntry) -> str:
         return "first model"
     if model.change == ["fit"]:
         return f"{model.base} refitted"
+    if model.removed:
+        return f"{model.base} without {model.removed}"
     proof = "" if model.proved else ", which the logs do not prove"
     return f"{model.base} + {' + '.join(model.change)}{proof}"
 

@@ -58,6 +58,7 @@ from identify.results.results import (
     Diagnosis,
     Feedforward,
     FitResult,
+    Removal,
     SimulationFit,
     refitted,
 )
@@ -271,6 +272,16 @@ def all_added_text(result: AllAdded) -> str:
             "them."
         )
     return "\n".join(lines)
+
+
+@text_of.register
+def removal_text(result: Removal) -> str:
+    """What was taken out, the errors with it and without, and whether the logs ask for it."""
+    step = result.step
+    asked = "ask for it: go on with the model before" if result.needed else "do not ask for it"
+    lines = [f"took {step.effect} off axis {step.axis}"]
+    lines += _errors_of(step, result.model.axes[step.axis].units.words)
+    return "\n".join([*lines, f"  The logs {asked}."])
 
 
 def _errors_of(step: HistoryStep, words: Callable[[str], str]) -> Iterator[str]:

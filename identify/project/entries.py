@@ -43,6 +43,7 @@ class ModelEntry(Entries):
     file: str = Field(description="the machine model (.toml)")
     base: str | None = Field(default=None, description="the model that was changed")
     change: list[str] = Field(default=[], description="effects that were added, or fit")
+    removed: str | None = Field(default=None, description="the effect that was taken out")
     proved: bool = Field(default=True, description="whether the logs prove the change")
     errors: list[ErrorsEntry] = Field(default=[], description="errors by axis and role")
 

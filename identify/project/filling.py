@@ -159,6 +159,7 @@ FILLINGS: Mapping[str, Filling] = {
     "add": Filling(
         _split(_ROLES, {"effect": _found, **_OF_MODEL}), _rest(_ROLES) | _NEW_MODEL
     ),
+    "remove": Filling(_split(_ROLES, _OF_MODEL), _rest(_ROLES) | _NEW_MODEL),
     "plan": Filling(
         _split(_ROLES, _OF_MODEL),
         {"holdout": _ROLES["holdout"], "out": _free("experiments", "{}.toml")},

@@ -32,6 +32,7 @@ KEPT = (
     "frf",
     "check",
     "add",
+    "remove",
     "fit",
     "view",
 )
@@ -154,6 +155,14 @@ def _add(given: Given, answer: Answer) -> Callable[[Project], Project]:
     return lambda project: _more(project, "models", entry)
 
 
+def _remove(given: Given, answer: Answer) -> Callable[[Project], Project]:
+    entry = ModelEntry(
+        file=str(given["out"]), base=given["model"], removed=answer["effect"],
+        errors=[*_of_step(answer)],
+    )  # fmt: skip
+    return lambda project: _more(project, "models", entry)
+
+
 def _corrected(given: Given, answer: Answer) -> Callable[[Project], Project]:
     """A body of the mechanism whose inertia is another, and what that does to each joint."""
     errors = [
@@ -192,5 +201,5 @@ def _export(given: Given, answer: Answer) -> Callable[[Project], Project]:
 
 _ADDING: Mapping[str, Adding] = {
     "import": _import, "new": _new, "fit": _fit, "add": _add, "plan": _plan, "export": _export,
-    "cut": _cut,
+    "cut": _cut, "remove": _remove,
 }  # fmt: skip

@@ -24,6 +24,9 @@ def _calls(project: Project, model: ModelEntry) -> Iterator[str]:
         yield f'model = twin.load_model("{model.file}")'
     elif model.change == ["fit"]:
         yield "model = identify.fit(model, fit, held, test).model"
+    elif model.removed:
+        place = f', axis="{model.errors[0].axis}"' if model.errors else ""
+        yield f'model = identify.remove("{model.removed}", model, fit, held, test{place}).model'
     elif len(model.change) == 1 and not model.change[0].startswith("body "):
         yield f'model = identify.add("{model.change[0]}", model, fit, held, test).model'
     else:

@@ -22,7 +22,7 @@ from identify.experiment_design.plan import Plan
 from identify.mechanism.bodies import WrongBody, corrected
 from identify.printed import Pictured, Printed
 from identify.results.frequency import FrequencyResponse
-from identify.selection.acceptance import left_on
+from identify.selection.acceptance import Judged, left_on, score
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Reshaped
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
@@ -336,7 +336,7 @@ def step_of_body(body: str, axis: str, before: FitResult, after: FitResult) -> H
     )  # fmt: skip
 
 
-# --- what was added, or corrected -----------------------------------------------------------------
+# --- what was added, removed, or corrected --------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -398,6 +398,28 @@ class AllAdded(Printed):
     given: FitResult
     steps: tuple[HistoryStep, ...]
     kept: bool
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Removal(Printed):
+    """A model less one effect, fitted. step: its errors with the effect and without. needed:
+    whether the logs ask for the effect beside the others.
+    """
+
+    model: MachineModel
+    step: HistoryStep
+    needed: bool
+
+
+def removal(effect: str, model: MachineModel, having: Fit, less: Fit, dataset: Dataset) -> Removal:
+    """The fit of an axis less an effect in a fitted model; having: the fit with it."""
+    name = dataset.axis
+    step = HistoryStep("remove", effect, name, **_errors_of(having, less, dataset))
+    made = model.with_axis(name, dataset.kept_in(less.axis)).with_history(step)
+    needed = score(Judged(less, dataset), Judged(having, dataset)).accepted
+    return Removal(
+        made.with_intervals(name, intervals_to_keep(less, estimates(less))), step, needed
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

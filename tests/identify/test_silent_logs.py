@@ -81,13 +81,14 @@ COMMANDS = {
     "info": "info L",
     "new": "new L -o new.toml",
     "plan": "plan m.toml L --duration 1 -o next.toml",
+    "remove": "remove coulomb_viscous m.toml L -o less.toml",
     "recover": "recover L -o whole.mcap",
     "view": "view L m.toml --html view.html",
     "watch": "watch L m.toml",
 }
 ONE_LOG = ("recover", "view", "export", "cut", "watch")
 FEW = ("coulomb_viscous", "quadratic_drag", "wear", "empirical_map")
-FITTED = ("fit", "compare", "diagnose", "add", "plan", "new")
+FITTED = ("fit", "compare", "diagnose", "add", "remove", "plan", "new")
 
 
 def takes_logs() -> dict[str, set[str]]:

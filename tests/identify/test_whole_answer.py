@@ -115,6 +115,32 @@ def test_what_a_saved_answer_found_is_added_later(drive: Path, answer: dict) -> 
     assert "force error on the test logs" in text
 
 
+def test_an_effect_is_taken_out_and_its_worth_told(drive: Path, answer: dict) -> None:
+    given = ("remove", "cogging", "better.toml", *ROLES)
+    done = twin(*given, "-o", "without.toml", "--json", folder=drive)
+    assert done.returncode == 0, done.stderr
+    told, less = json.loads(done.stdout), load_model(drive / "without.toml")
+    assert told["needed"]
+    assert told["test_error_before"] == pytest.approx(answer["test_error_after"], rel=0.01)
+    assert told["test_error_after"] > 10.0 * told["test_error_before"]
+    assert {*less.axes["x"].names} == {*load_model(drive / "better.toml").axes["x"].names} - {
+        "cogging"
+    }
+    assert less.history[-1].action == "remove"
+    assert errors_of(drive / "without.toml", drive)[1] == pytest.approx(
+        told["test_error_after"], rel=0.05
+    )
+    more = ("add", "quadratic_drag", "better.toml", *ROLES, "-o", "more.toml")
+    assert twin(*more, folder=drive).returncode == 1  # as nothing proves it
+    text = twin(
+        "remove", "quadratic_drag", "more.toml", *ROLES, "-o", "x.toml", folder=drive
+    ).stdout
+    assert text.startswith("took quadratic_drag off axis x\n")
+    assert "The logs do not ask for it." in text
+    said = refusal("remove", "wear", "better.toml", *ROLES, "-o", "x.toml", folder=drive)
+    assert "wear: cannot be taken out; axis x has" in said
+
+
 def test_what_is_no_answer_is_refused_in_one_line(drive: Path, answer: dict) -> None:
     for name, text in (("no.json", "{}"), ("list.json", "[1]"), ("m.toml", None)):
         if text is not None:

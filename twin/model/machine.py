@@ -20,7 +20,7 @@ class HistoryStep:
     """One step of the model's growth; errors are RMS force errors, None where not measured."""
 
     action: str
-    """What was done: "add" or "replace"."""
+    """What was done: "add", "shape", "body" or "remove"."""
     effect: str
     """Name of the effect."""
     axis: str

@@ -57,7 +57,8 @@ const model = {
     if (file && !this.values[file]) {
       get(`/api/model?file=${encodeURIComponent(file)}`).then(m => { this.values[file] = m; this.update(state); }).catch(() => {});
     }
-    put(this.cards, [this.values[file] ?? null], () => this.values[file] ? cardsOf(this.values[file]) : []);
+    put(this.cards, [this.values[file] ?? null, jobsOf(state, "remove"), jobsOf(state, "add")],
+      () => this.values[file] ? cardsOf(this.values[file], state) : []);
     frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
     const listed = file ? effects(() => this.update(state)) : [];
     put(this.gallery, [file, listed.length, this.filter, jobsOf(state, "add")], () => listed.length ? galleryOf(this, state, listed) : []);
@@ -79,13 +80,32 @@ const model = {
   },
 };
 
-function cardsOf(found) {
+function cardsOf(found, state) {
   return Object.entries(found.axes).flatMap(([axis, table]) => [h("h3", {}, `Axis ${axis}`), h("div", { class: "cards" },
-    card("Axis", table.values, null), ...table.effects.map(e => card(e.name, e.values, e.fixed)))]);
+    card("Axis", table.values, null),
+    ...table.effects.map(e => card(e.name, e.values, e.fixed, switchOf(state, axis, e.name, true))),
+    ...takenOut(state, axis).filter(name => !table.effects.some(e => e.name === name)).map(name => h("div", { class: "card soft" },
+      h("h3", {}, name, switchOf(state, axis, name, false)), h("p", {}, "Taken out; the ledger tells the error with it and without."))))]);
 }
 
-function card(name, values, fixed) {
-  return h("div", { class: "card" }, h("h3", {}, name), h("table", {}, h("tbody", {}, ...values.map(v => h("tr", {},
+/** Effects that were taken out of an axis and not added again. */
+function takenOut(state, axis) {
+  const out = new Set();
+  for (const m of state.models) {
+    if (m.removed && m.errors[0]?.axis === axis) out.add(m.removed);
+    for (const name of m.change) out.delete(name);
+  }
+  return [...out];
+}
+
+function switchOf(state, axis, name, on) {
+  return h("button", { class: "switch", role: "switch", "aria-checked": String(on), "aria-label": `${name} of axis ${axis}`,
+    disabled: busy(state, "remove") || busy(state, "add"), title: on ? "Take it out and fit the others" : "Add it again and fit",
+    onclick: () => run(on ? "remove" : "add", name, "--axis", axis) }, on ? "on" : "off");
+}
+
+function card(name, values, fixed, toggle = null) {
+  return h("div", { class: "card" }, h("h3", {}, name, toggle), h("table", {}, h("tbody", {}, ...values.map(v => h("tr", {},
     h("td", { title: v.meaning }, fixed === null ? v.name.replaceAll("_", " ") : v.meaning || v.name), h("td", {}, h("b", {}, v.shown),
       v.band ? h("div", { class: "soft" }, `90 %: ${v.band[0]} to ${v.band[1]}`) : null,
       fixed?.includes(v.name) ? h("div", { class: "soft" }, "held") : null))))));

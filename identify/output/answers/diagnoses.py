@@ -25,7 +25,7 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.findings import pairs_in_words
-from identify.results.results import Addition, AllAdded, Diagnosis
+from identify.results.results import Addition, AllAdded, Diagnosis, Removal
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind
@@ -103,6 +103,19 @@ class StepErrorsEntry(Entry):
     holdout_error_after: Number
     test_error_before: Number
     test_error_after: Number
+
+
+class RemovalAnswer(Answer, StepErrorsEntry):
+    """What `twin remove` prints: the RMS errors with the effect and without it."""
+
+    needed: bool
+    """Whether the logs ask for the effect beside the others."""
+    left_out: list[str] = Field([])
+
+
+@answer_of.register
+def _(result: Removal, **more: Any) -> RemovalAnswer:
+    return RemovalAnswer.of(result, result.step, **more)
 
 
 class AllAddedAnswer(Answer):
