@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -107,11 +108,21 @@ class Jobs:
         said = [line.removeprefix("twin: ") for line in lines]
         progress = [line for line in said if line.endswith(PROGRESS)]
         remarks = [line for line in said if not line.endswith(PROGRESS)]
+        text = self.said(job, ".out")[:20000]
+        if job.code and not remarks and not text:
+            remarks = [self._silent(job)]
         return {
             **asdict(job), "command": shlex.join(["twin", *job.words]),
             "progress": progress[-1] if progress and job.state == "running" else None,
-            "remarks": remarks[-20:], "text": self.said(job, ".out")[:20000],
+            "remarks": remarks[-20:], "text": text,
         }  # fmt: skip
+
+    def _silent(self, job: Job) -> str:
+        """Why a job that went wrong says nothing: what it says is written, too."""
+        least = 1_000_000  # bytes, less than what a command writes
+        if shutil.disk_usage(self.folder.root).free < least:
+            return "no space is left on the disk of this folder; nothing of it is half written"
+        return f"it ended without saying why, with exit code {job.code}"
 
     def _work(self) -> None:
         while True:

@@ -3,7 +3,9 @@
 import json
 import os
 import re
+import shutil
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from time import sleep
@@ -187,3 +189,37 @@ def test_what_ended_with_the_server_is_told_by_the_next_one(jobs):
     place.write_text(json.dumps({"number": 7, "words": ["diagnose"], "state": "running"}))
     (jobs.place / "8.json").write_text("half")
     assert Jobs(jobs.folder).jobs[7].state == "killed"
+
+
+@pytest.fixture
+def tiny(tmp_path):
+    """A disk of its own of 300 kB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
+    if sys.platform != "linux" or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("no disk can be made here: that asks for Linux and for root")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.slow  # two processes
+def test_a_full_disk_is_told_in_a_sentence_and_nothing_is_half_written(tiny):
+    folder = Folder(tiny)
+    folder.begin()
+    server = Server(folder, 10**6)
+    jobs, app = server.jobs, application(server, TOKEN, PORT)
+    before = folder.file.read_bytes()
+    (tiny / "fill").write_bytes(bytes(shutil.disk_usage(tiny).free // 4096 * 4096))
+    job = jobs.add(["import", "run.csv"])
+    assert jobs.wait(job.number, 60.0).code
+    (said,) = (j["remarks"] for j in jobs.shown() if j["number"] == job.number)
+    assert len(said) == 1
+    assert re.search("[Nn]o space( is)? left", said[0])
+    given = {**KNOWN, "origin": f"http://{HOST}"}
+    answer = asked(app, "/api/upload/run.csv", "PUT", bytes(100_000), **given)
+    assert answer.status == 400, answer.body
+    assert b"No space left on device" in answer.body
+    jobs.close()
+    assert folder.file.read_bytes() == before
+    assert {p.name for p in tiny.iterdir()} == {"fill", "project.toml", ".twin"}
