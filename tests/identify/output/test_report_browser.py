@@ -283,7 +283,7 @@ def drag(page: Browser, place: str, first: tuple[float, float], last: tuple[floa
 
 
 MARKS = """const pink = id => {
-  const c = document.querySelector(`#${id} canvas`);
+  const c = [...document.querySelectorAll(`#${id} canvas`)].at(-1);  // the sheet of marks
   const own = new OffscreenCanvas(c.width, c.height).getContext("2d", {willReadFrequently: true});
   own.drawImage(c, 0, 0);
   const p = own.getImageData(0, 0, c.width, c.height).data;

@@ -18,9 +18,10 @@ const extent = values => {
 };
 // A few spikes would leave nothing to be seen of all else: then the range is three times that of 90 % of the values.
 const usual = values => {
-  const sorted = Float64Array.from(values.filter(v => v != null)).sort(), at = p => sorted[Math.round(p * (sorted.length - 1))];
-  if (!sorted.length) return [0, 1];
-  const [first, low, high, last] = [0, 0.05, 0.95, 1].map(at), width = high - low;
+  const known = values.filter(v => v != null), every = Math.ceil(known.length / 20000);
+  if (!known.length) return [0, 1];
+  const sorted = Float64Array.from(known.filter((v, i) => i % every === 0)).sort(), at = p => sorted[Math.round(p * (sorted.length - 1))];
+  const [first, last] = extent(known), [low, high] = [0.05, 0.95].map(at), width = high - low;
   return width > 0 && last - first > 5 * width ? [Math.max(first, low - width), Math.min(last, high + width)] : [first, last];
 };
 const within = (v, [low, high]) => v >= low && v <= high;
@@ -36,9 +37,11 @@ function plot(place, options, values) {
   const axis = (name, more) => ({label: name, stroke: INK, grid: {stroke: GRID, width: 1},
     ticks: {stroke: GRID}, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif",
     labelSize: 20, ...more});
+  const dense = values[0].length > 8000;  // then of each pixel the least and the most are drawn
   const u = new uPlot({
-    width: Math.max(place.clientWidth, 200), pxAlign: false, ...options, series: [options.x, ...options.series],
+    width: Math.max(place.clientWidth, 200), pxAlign: dense, ...options, series: [options.x, ...options.series],
     scales: {x: {time: false}, ...options.scales},
+    hooks: {...options.hooks, draw: [...options.hooks?.draw ?? [], u => u.repaint?.()]},
     axes: [axis(options.labels[0], {size: 32, ...(options.labels[0] ? {} : {label: null}), ...(options.days ? {values: options.days} : {})}), axis(options.labels[1], {size: 62, ...(options.scales?.y?.distr ? {values: (u, at) => at.map(v => v == null ? "" : digits(v))} : {})})],
   }, values, place);
   if (!place.watch) {
@@ -46,19 +49,42 @@ function plot(place, options, values) {
     place.watch.observe(place);
   }
   place.shown = u;
+  if (options.marks) {  // on a sheet above, as the plot below stays while they change
+    u.sheet = u.ctx.canvas.cloneNode();
+    u.sheet.style.pointerEvents = "none";
+    u.ctx.canvas.after(u.sheet);
+    u.marks = u.sheet.getContext("2d");
+    u.repaint = () => {
+      u.sheet.width = u.ctx.canvas.width, u.sheet.height = u.ctx.canvas.height;
+      u.sheet.style.cssText = `${u.ctx.canvas.style.cssText}; pointer-events: none`;
+      options.marks(u, u.marks);
+    };
+  }
   return u;
 }
+// Dots of a plot, at most so many on a pixel that more would show no more.
+function dots(u, ctx, x, y, indices, size, most = 4) {
+  const {left: l, top: t, width: w, height: h} = u.bbox, {min: x0, max: x1} = u.scales.x, {min: y0, max: y1} = u.scales.y;
+  const [sx, sy] = [w / (x1 - x0), h / (y1 - y0)], taken = new Uint8Array((Math.ceil(w) + 1) * (Math.ceil(h) + 1)), row = Math.ceil(w) + 1;
+  for (const i of indices) {
+    if (x[i] == null || y[i] == null) continue;
+    const px = (x[i] - x0) * sx, py = (y1 - y[i]) * sy;
+    if (!(px >= 0 && px <= w && py >= 0 && py <= h) || taken[Math.floor(py) * row + Math.floor(px)]++ >= most) continue;
+    ctx.fillRect(l + px - size / 2, t + py - size / 2, size, size);
+  }
+}
+function* between(a, b) { for (let i = a; i < b; i++) yield i; }
 const line = (name, color, unit, more) => ({label: name, stroke: color, width: 1.25,
   points: {show: false}, value: withUnit(unit), ...more});
 
-function rectangle(u, left, right, low, high, color) {
+function rectangle(u, left, right, low, high, color, ctx = u.ctx) {
   const [x0, x1] = [left, right].map(v => v == null ? null : u.valToPos(v, "x", true));
   const {left: l, top: t, width: w, height: h} = u.bbox;
   const [y0, y1] = [low, high].map((v, i) => v == null ? t + (1 - i) * h : u.valToPos(v, "y", true));
   const a = Math.max(x0 ?? l, l), b = Math.min(x1 ?? l + w, l + w);
   const c = Math.max(y1, t), d = Math.min(y0, t + h);
-  u.ctx.fillStyle = color;
-  if (b > a && d > c) u.ctx.fillRect(a, c, b - a, d - c);
+  ctx.fillStyle = color;
+  if (b > a && d > c) ctx.fillRect(a, c, b - a, d - c);
 }
 
 // --- signals of an axis --------------------------------------------------------------------
@@ -156,11 +182,12 @@ if (data.length) {
     const common = {
       x: {label: "Time", value: (u, v) => v == null ? "–" : `${digits(v - axis.logAt(v).begin)} s of ${axis.logAt(v).title}`},
       cursor: {sync: {key: "time", setSeries: false}, drag: {x: true, y: false, setScale: !$("mark").checked}, points: {size: 6}},
+      marks: stripes,
     };
     const hooks = {
       setSelect: [u => dragged(u, ([low, high]) => i => axis.x[i] >= low && axis.x[i] <= high)],
       setScale: [(u, key) => key === "x" && !busy && zoomed(u.scales.x.min, u.scales.x.max)],
-      draw: [u => stripes(u), u => axis.logs.slice(1).forEach(log => {
+      draw: [u => axis.logs.slice(1).forEach(log => {
         const at = u.valToPos(log.begin, "x", true);
         if (at < u.bbox.left || at > u.bbox.left + u.bbox.width) return;
         u.ctx.fillStyle = SOFT, u.ctx.fillRect(at, u.bbox.top, 1, u.bbox.height);
@@ -224,16 +251,17 @@ if (data.length) {
     $("mark-none").disabled = !count;
     $("mark-note").textContent = count ? `Marked in all plots: ${count} test functions, ${digits(100 * count / all)} % of all, with `
       + `${digits(100 * error / whole)} % of the squared ${title("before")}, from ${at(first)} to ${at(last)}.` : "";
-    for (const place of [$("forces"), $("left"), $("motion"), $("coordinate"), $("map-plot")]) place.shown?.redraw(false);
+    for (const place of [$("forces"), $("left"), $("motion"), $("coordinate"), $("map-plot")]) place.shown?.repaint();
   }
-  function stripes(u) {
+  function* those(a, b) { for (let i = a; marked && i < b; i++) if (marked[i]) yield i; }
+  function stripes(u, ctx) {
     if (!marked) return;
     const x = axis.x, [low, high] = [u.scales.x.min, u.scales.x.max], least = (high - low) / u.bbox.width;
     for (let i = 0; i < x.length; i++) {
       if (!marked[i] || x[i] > high) continue;
       const first = i;
       while (marked[i + 1]) i++;
-      if (x[i] >= low) rectangle(u, x[first] - least, x[i] + least, null, null, "rgba(194,24,91,.30)");
+      if (x[i] >= low) rectangle(u, x[first] - least, x[i] + least, null, null, "rgba(194,24,91,.30)", ctx);
     }
   }
 
@@ -288,15 +316,15 @@ if (data.length) {
     const group = what === "residual" ? axis.residuals.map((n, i) => [n, [BEFORE, AFTER][i]])
       : what === "force" ? series().slice(0, series().length - axis.effects.length) : series().filter(s => s[0] === what);
     const unit = axis.of(what === "residual" ? "before" : "to_explain").unit;
-    const dots = group.map(([name]) => shown(name)), speed = axis.values("velocity");
-    const xs = x.slice(a, b), [low, high] = extent(xs), every = dots.flatMap(d => d.slice(a, b)), reach = usual(every), ends = extent(every);
+    const values_of = group.map(([name]) => shown(name)), speed = axis.values("velocity");
+    const xs = x.slice(a, b), [low, high] = extent(xs), every = values_of.flatMap(d => d.slice(a, b)), reach = usual(every), ends = extent(every);
     const floor = what === "residual" ? axis.floor : 0;
     const sides = $("apart").checked ? [["forwards", i => speed[i] > 0, []], ["backwards", i => speed[i] < 0, [6, 4]]] : [["", () => true, []]];
     const lines = [], values = [];
     let at;
     group.forEach(([name, color], g) => sides.forEach(([side, accepts, dash]) => {
       let mean;
-      [at, mean] = means(x, dots[g], a, b, low, high, accepts);
+      [at, mean] = means(x, values_of[g], a, b, low, high, accepts);
       values.push([null, ...mean, null]);
       lines.push(line(`mean ${title(name)}${side && ", " + side}`, color, unit, {width: 2.25, dash, spanGaps: false}));
     }));
@@ -306,27 +334,18 @@ if (data.length) {
       height: 390, labels: [label(along), `${what === "residual" ? axis.texts.residual : axis.texts.force} (${unit})`],
       x: {label: along.label, value: withUnit(along.unit)}, series: lines, cursor: {drag: {x: true, y: true, uni: 12, setScale: !$("mark").checked}},
       scales: {y: {range: () => bounds}},
-      hooks: {setSelect: [u => dragged(u, (along, across) => i => within(x[i], along) && dots.some(d => d[i] != null && within(d[i], across)))],
+      marks: (u, ctx) => {
+        ctx.fillStyle = MARK, ctx.globalAlpha = 0.8;
+        values_of.forEach(own => dots(u, ctx, x, own, those(a, b), b - a > 8000 ? 4 : 6, 1));
+      },
+      hooks: {setSelect: [u => dragged(u, (along, across) => i => within(x[i], along) && values_of.some(d => d[i] != null && within(d[i], across)))],
         drawClear: [u => {
         if (floor) rectangle(u, null, null, -floor, floor, FLOOR);
-        const {left: l, top: t, width: w, height: h} = u.bbox, size = b - a > 8000 ? 2 : 3, ctx = u.ctx;
+        const size = b - a > 8000 ? 2 : 3, ctx = u.ctx;
         group.forEach(([, color], g) => {
           ctx.fillStyle = color, ctx.globalAlpha = b - a > 8000 ? 0.25 : 0.4;
-          for (let i = a; i < b; i++) {
-            if (x[i] == null || dots[g][i] == null) continue;
-            const px = u.valToPos(x[i], "x", true), py = u.valToPos(dots[g][i], "y", true);
-            if (px >= l && px <= l + w && py >= t && py <= t + h) ctx.fillRect(px - size / 2, py - size / 2, size, size);
-          }
+          dots(u, ctx, x, values_of[g], between(a, b), size);
         });
-        ctx.fillStyle = MARK, ctx.globalAlpha = 0.8;
-        for (let i = a; marked && i < b; i++) {
-          if (!marked[i] || x[i] == null) continue;
-          for (const dot of dots) {
-            if (dot[i] == null) continue;
-            const px = u.valToPos(x[i], "x", true), py = u.valToPos(dot[i], "y", true);
-            if (px >= l && px <= l + w && py >= t && py <= t + h) ctx.fillRect(px - size, py - size, 2 * size, 2 * size);
-          }
-        }
         ctx.globalAlpha = 1;
       }]},
     }, [[low, ...at, high === low ? low + 1 : high], ...values]);
@@ -358,19 +377,20 @@ if (data.length) {
       height: 320, labels: [label(axis.of(nx)), label(axis.of(ny))], legend: {show: false},
       x: {}, series: [{stroke: "transparent"}], cursor: {drag: {x: true, y: true, uni: 12, setScale: !$("mark").checked}},
       scales: {y: {range: () => [y0, y0 + rows * dy]}},
+      marks: (u, ctx) => {
+        const cells = new Set();
+        for (const i of those(a, b)) if (x[i] != null && y[i] != null) cells.add(cell(x[i], y[i]));
+        ctx.strokeStyle = MARK, ctx.lineWidth = 2;
+        for (const k of cells) {
+          const [i, j] = [k % columns, Math.floor(k / columns)], px = v => u.valToPos(v, "x", true), py = v => u.valToPos(v, "y", true);
+          ctx.strokeRect(px(x0 + i * dx), py(y0 + (j + 1) * dy), px(x0 + dx) - px(x0), py(y0) - py(y0 + dy));
+        }
+      },
       hooks: {
         draw: [u => error.forEach((v, k) => {
           const i = k % columns, j = Math.floor(k / columns);
           if (v != null) rectangle(u, x0 + i * dx, x0 + (i + 1) * dx, y0 + j * dy, y0 + (j + 1) * dy, color(v));
-        }), u => {
-          const cells = new Set();
-          for (let i = a; marked && i < b; i++) if (marked[i] && x[i] != null && y[i] != null) cells.add(cell(x[i], y[i]));
-          u.ctx.strokeStyle = MARK, u.ctx.lineWidth = 2;
-          for (const k of cells) {
-            const [i, j] = [k % columns, Math.floor(k / columns)], px = v => u.valToPos(v, "x", true), py = v => u.valToPos(v, "y", true);
-            u.ctx.strokeRect(px(x0 + i * dx), py(y0 + (j + 1) * dy), px(x0 + dx) - px(x0), py(y0) - py(y0 + dy));
-          }
-        }],
+        })],
         setSelect: [u => dragged(u, (along, across) => i => x[i] != null && y[i] != null && within(x[i], along) && within(y[i], across))],
         setCursor: [u => {
           const at = [u.posToVal(u.cursor.left, "x"), u.posToVal(u.cursor.top, "y")], k = cell(...at);
