@@ -31,7 +31,7 @@ def write_page(path: Path, replay: Replay, gain: float, speed: float) -> None:
         notes=replay.notes,
         data={
             "gain": gain, "speed": speed, "horizon": replay.horizon, "start": replay.start,
-            "rate": replay.rate, "frames": len(replay),
+            "log": replay.log, "rate": replay.rate, "frames": len(replay),
             "axes": [_axis(name, axis) for name, axis in replay.axes.items()],
             **_scene(Stage.of(replay), replay),
         },

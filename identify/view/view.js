@@ -1,7 +1,7 @@
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
 const at = (id) => document.getElementById(id);
-const FINE = 32, GHOST = [0.08, 0.42, 1.0, 0.55], MARK = [1.0, 0.45, 0.05, 1.0];
+const FINE = 32, GHOST = [0.08, 0.42, 1.0, 0.55], MARK = [1.0, 0.45, 0.05, 1.0], CHOSEN = [0.76, 0.09, 0.36, 1.0];
 
 // Signals: 16 bits a value, NaN where there is none.
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -182,7 +182,7 @@ function projection() {
 }
 
 // What is shown now.
-const state = { time: 0, playing: false, speed: data.speed, gain: data.gain, ghost: true, from: 0, to: duration };
+const state = { time: 0, playing: false, speed: data.speed, gain: data.gain, ghost: true, from: 0, to: duration, chosen: [] };
 const frame = () => Math.min(Math.round(state.time * data.rate), data.frames - 1);
 const standing = {
   measured: (axis) => axis.measured[frame()],
@@ -209,6 +209,7 @@ function drawScene() {
     drawBuffer(ball, times(placed(link, standing.measured), spot), [0, 0, 0, 0]);
     if (Number.isFinite(data.axes[axis].setpoint[frame()])) drawBuffer(ball, times(placed(link, standing.setpoint), spot), MARK);
   });
+  drawChosen();
   if (!state.ghost || !data.axes.some((axis) => Number.isFinite(axis.modelled[frame()]))) return;
   gl.enable(gl.POLYGON_OFFSET_FILL); // where the ghost is where the machine is, the machine is seen
   gl.polygonOffset(1, 1);
@@ -222,6 +223,20 @@ function drawScene() {
   }
   gl.disable(gl.BLEND);
   gl.disable(gl.POLYGON_OFFSET_FILL);
+}
+
+/** Where the machine was at the instants that are marked on the page of the comparison. */
+function drawChosen() {
+  const most = 200, frames = state.chosen.flatMap(([from, to]) => {
+    const [first, last] = [from, to].map((t) => Math.min(Math.max(Math.round(t * data.rate), 0), data.frames - 1));
+    return [...Array(last - first + 1)].map((_, i) => first + i);
+  });
+  const every = Math.ceil(frames.length / most) || 1, sites = data.marks.length ? data.marks : [{ link: data.links.length - 1, at: [0, 0, 0] }];
+  for (let i = 0; i < frames.length; i += every)
+    for (const { link, at } of sites) {
+      const spot = [0.6, 0, 0, 0, 0, 0.6, 0, 0, 0, 0, 0.6, 0, ...at, 1];
+      drawBuffer(ball, times(placed(link, (axis) => axis.measured[frames[i]]), spot), CHOSEN);
+    }
 }
 
 function fit(target) {
@@ -239,6 +254,8 @@ function drawChart() {
   g.clearRect(0, 0, wide, chart.height);
   const column = (t) => ((t - state.from) / (state.to - state.from)) * wide;
   g.font = `${12 * dense}px system-ui, sans-serif`;
+  g.fillStyle = "rgba(194,24,91,.30)";
+  for (const [from, to] of state.chosen) g.fillRect(column(from) - dense, 0, column(to) - column(from) + 2 * dense, chart.height - 18 * dense);
   strips.forEach((strip, i) => {
     const top = i * TALL * dense, tall = (TALL - 26) * dense, base = top + 20 * dense;
     const first = Math.max(Math.floor(state.from * data.rate), 0), last = Math.min(Math.ceil(state.to * data.rate), data.frames - 1);
@@ -361,5 +378,13 @@ chart.addEventListener("wheel", (e) => { // zoom in time about the pointer
   draw();
 }, { passive: false });
 addEventListener("resize", draw);
+const stem = (name) => name.replace(/^.*\//, "").replace(/\.mcap$/, "");
+addEventListener("message", (e) => { // what is marked on the page of a comparison, in `twin app`
+  if (e.source !== parent || e.data?.twin !== "marked") return;
+  const own = e.data.spans.filter((s) => stem(s.log) === stem(data.log)).map((s) => [s.from - data.start, s.to - data.start]);
+  state.chosen = own.filter(([from, to]) => to >= 0 && from <= duration);
+  if (state.chosen.length) seek(state.chosen[0][0]);
+  else draw();
+});
 home();
 draw();

@@ -30,10 +30,20 @@ export function region(section, tag = "div") {
   return made;
 }
 
+/** What is marked on the page of a comparison is marked in the replay beside it. */
+let marked = null;
+addEventListener("message", event => {
+  const shown = [...document.querySelectorAll("iframe")].map(f => f.contentWindow);
+  if (event.data?.twin !== "marked" || !shown.includes(event.source)) return;
+  marked = event.data;
+  for (const other of shown) if (other !== event.source) other.postMessage(marked, "*");
+});
+
 /** Show a page of the project in a frame; the frame stays while the page is the same. */
 export function frames(place, file, title) {
   put(place, file, () => file ? [h("iframe", {
     src: `/files/${file.split("/").map(encodeURIComponent).join("/")}`, title, sandbox: "allow-scripts allow-downloads",
+    onload: event => { if (marked) event.target.contentWindow.postMessage(marked, "*"); },
   }), h("p", { class: "soft" }, h("a", { href: `/files/${file}?keep=1`, download: "" }, `Save ${file}`),
     " as one file, for a colleague without this program.")] : []);
 }

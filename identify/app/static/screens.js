@@ -27,8 +27,8 @@ function effects(then) {
 /** Whether a command of this kind runs or waits. */
 const busy = (state, kind) => state.jobs.some(j => ["running", "waiting"].includes(j.state) && j.words[0] === kind);
 
-function button(text, kind, words, state, lead = false) {
-  return h("button", { id: `do-${words.join("-").replace(/\W/g, "-")}`, class: lead ? "main" : "",
+function button(text, kind, words, state, lead = false, screen = "do") {
+  return h("button", { id: `${screen}-${words.join("-").replace(/\W/g, "-")}`, class: lead ? "main" : "",
     disabled: busy(state, kind), onclick: () => run(...words) }, busy(state, kind) ? "Runs ..." : text);
 }
 
@@ -130,12 +130,15 @@ const compare = {
     section.append(h("h2", {}, "Compare model and machine"));
     this.top = region(section);
     this.page = region(section);
+    this.view = region(section);
   },
   update(state) {
-    put(this.top, [state.models.length, jobsOf(state, "compare")], () => state.models.length ? [
-      h("p", {}, "Where the force of the model differs from that of the machine, on the test logs: by time, position, speed and direction."),
-      button("Compare the present model", "compare", ["compare"], state, true)] : [needsModel()]);
+    put(this.top, [state.models.length, jobsOf(state, "compare"), jobsOf(state, "view")], () => state.models.length ? [
+      h("p", {}, "Where the force of the model differs from that of the machine, on the test logs: by time, position, speed and direction. What is marked there is marked in the replay below."),
+      h("div", { class: "row" }, button("Compare the present model", "compare", ["compare"], state, true),
+        button("Show it move in 3D", "view", ["view"], state, false, "compare"))] : [needsModel()]);
     frames(this.page, last(state, "compare")?.page, "Comparison of model and machine");
+    frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
   },
 };
 

@@ -80,6 +80,7 @@ def _logs(signals: Signals, index: NDArray[np.int64]) -> list[dict[str, Any]]:
     kept = np.searchsorted(index, begins)
     return [
         {
+            "name": log.motion.name,
             "title": f"{log.motion.name}{f' ({role.value})' if role else ''}",
             "first": int(first),
             "count": int(count),

@@ -99,6 +99,38 @@ def test_the_walk_from_three_files_to_the_added_effect(tmp_path):
     assert own == outside  # to the last digit
 
 
+@pytest.mark.slow  # a comparison and a replay
+def test_what_is_marked_in_the_comparison_is_marked_in_the_replay(tmp_path):
+    files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k)) for k in range(3)]
+    folder = tmp_path / "machine"
+    folder.mkdir()
+    with served(folder) as address, browsed() as context:
+        page = context.new_page()
+        page.goto(address)
+        page.set_input_files("#files", files)
+        page.click("#import-all")
+        page.wait_for_selector("text=force explained to")
+        page.click("nav >> text=Model")
+        page.click("#new")
+        page.wait_for_selector("text=Fit its values")
+        page.click("nav >> text=Compare")
+        page.click("#do-compare")
+        page.click("#compare-view")
+        page.wait_for_selector("iframe[title^=Comparison] >> visible=true")
+        page.wait_for_selector("iframe[title*='in 3D'] >> visible=true")
+        both = {f.name or f.url: f for f in page.frames[1:]}
+        compared = next(f for url, f in both.items() if "compare" in url)
+        replay = next(f for url, f in both.items() if "compare" not in url)
+        replay.wait_for_selector("#chart")
+        compared.click("#mark-largest")
+        replay.wait_for_function("state.chosen.length > 0")
+        spans, seconds = replay.evaluate("[state.chosen, duration]")
+        assert all(-0.1 <= first <= last <= seconds + 0.1 for first, last in spans)
+        assert 0.03 * seconds < sum(last - first for first, last in spans) < 0.1 * seconds
+        compared.click("#mark-none")
+        replay.wait_for_function("state.chosen.length === 0")
+
+
 def running(page, command: str) -> int:
     """The process of a command, as soon as it runs."""
     asked = "fetch('/api/state').then(a => a.json()).then(s => s.jobs[0])"

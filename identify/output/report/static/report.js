@@ -51,12 +51,11 @@ function plot(place, options, values) {
   place.shown = u;
   if (options.marks) {  // on a sheet above, as the plot below stays while they change
     u.sheet = u.ctx.canvas.cloneNode();
-    u.sheet.style.pointerEvents = "none";
     u.ctx.canvas.after(u.sheet);
     u.marks = u.sheet.getContext("2d");
     u.repaint = () => {
       u.sheet.width = u.ctx.canvas.width, u.sheet.height = u.ctx.canvas.height;
-      u.sheet.style.cssText = `${u.ctx.canvas.style.cssText}; pointer-events: none`;
+      u.sheet.style.cssText = `${u.ctx.canvas.style.cssText}; position: absolute; left: 0; top: 0; pointer-events: none`;
       options.marks(u, u.marks);
     };
   }
@@ -252,6 +251,15 @@ if (data.length) {
     $("mark-note").textContent = count ? `Marked in all plots: ${count} test functions, ${digits(100 * count / all)} % of all, with `
       + `${digits(100 * error / whole)} % of the squared ${title("before")}, from ${at(first)} to ${at(last)}.` : "";
     for (const place of [$("forces"), $("left"), $("motion"), $("coordinate"), $("map-plot")]) place.shown?.repaint();
+    if (parent !== window) parent.postMessage({twin: "marked", spans: [...spans()]}, "*");  // to the replay beside it
+  }
+  function* spans() {  // of each log, from which second to which
+    for (let i = 0; marked && i < axis.x.length; i++) {
+      if (!marked[i]) continue;
+      const first = i, log = axis.logAt(axis.x[i]);
+      while (marked[i + 1]) i++;
+      yield {log: log.name, from: axis.x[first] - log.begin - log.step / 2, to: axis.x[i] - log.begin + log.step / 2};
+    }
   }
   function* those(a, b) { for (let i = a; marked && i < b; i++) if (marked[i]) yield i; }
   function stripes(u, ctx) {
