@@ -300,7 +300,7 @@ return {seen: ["forces", "left", "motion", "coordinate", "map-plot"].map(pink),
 def test_what_is_marked_in_one_plot_is_marked_in_all_and_told(page: Browser) -> None:
     clear = page.run(MARKS)
     lie = """const [a, b] = document.querySelectorAll("#coordinate canvas");
-      return [a, b].map(c => { const r = c.getBoundingClientRect(); return [r.x, r.y, r.width]; });"""
+      return [a, b].map(c => c.getBoundingClientRect()).map(r => [r.x, r.y, r.width]);"""
     below, sheet = page.run(lie)
     assert sheet == below
     assert clear["note"] == ""
