@@ -28,7 +28,7 @@ from identify.estimation.fit import Fit, is_linear
 from identify.estimation.force_balance import STEP, changes
 from identify.estimation.least_squares import ROUNDING
 from identify.rules import RULE
-from twin.effect import Parameter
+from twin.effect import LEAST, Parameter
 from twin.model.machine import AxisIntervals, AxisModel
 from twin.model.parameters import ParameterReference, read, write
 from twin.model.units import Scale, has_size
@@ -109,7 +109,8 @@ def _free(fit: Fit, common: NoInterval | None) -> list[Estimate]:
     out = []
     for c, value, width in zip(where, read(fit.axis, where).tolist(), half, strict=True):
         p, why = c.parameter, reasons.get(c.label)
-        low = None if why else float(max(value - width, p.lower))
+        least = 0.0 if p.lower == LEAST else p.lower  # which is beyond any machine
+        low = None if why else float(max(value - width, least))
         high = None if why else float(min(value + width, p.upper))
         out.append(Estimate(c.label, value, units(p.unit), low, high, True, why))
     return out

@@ -1,5 +1,5 @@
 // The screens, left to right as the work goes.
-import { get, run } from "./app.js";
+import { get, run, stateNow } from "./app.js";
 import { bar, frames, h, last, percent, put, region } from "./build.js";
 import { recordings } from "./recordings.js";
 
@@ -22,6 +22,12 @@ function effects(then) {
     get("/api/effects").then(a => { catalogue = a.effects; then(); }).catch(() => { catalogue = null; });
   }
   return catalogue;
+}
+
+/** What an effect is, in a line; nothing of what is none, or before the catalogue has come. */
+function meaning(name) {
+  const known = catalogue?.find(e => e.name === name?.replace(/_\d+$/, ""));
+  return known ? h("p", { class: "soft" }, known.summary) : null;
 }
 
 /** Whether a command of this kind runs or waits. */
@@ -52,15 +58,15 @@ const model = {
       jobsOf(state, "fit")], () => file ? [
       h("div", { class: "row" }, h("b", {}, file), button("Fit its values", "fit", ["fit"], state),
         button("Show it move in 3D", "view", ["view"], state),
-        h("a", { href: "#diagnose" }, "Diagnose: what does it lack?")),
+        h("a", { class: "next", href: "#diagnose" }, "Diagnose: what does it lack?")),
     ] : this.first(state));
     if (file && !this.values[file]) {
-      get(`/api/model?file=${encodeURIComponent(file)}`).then(m => { this.values[file] = m; this.update(state); }).catch(() => {});
+      get(`/api/model?file=${encodeURIComponent(file)}`).then(m => { this.values[file] = m; this.update(stateNow()); }).catch(() => {});
     }
-    put(this.cards, [this.values[file] ?? null, jobsOf(state, "remove"), jobsOf(state, "add")],
+    const listed = file ? effects(() => this.update(stateNow())) : [];
+    put(this.cards, [this.values[file] ?? null, listed.length, jobsOf(state, "remove"), jobsOf(state, "add")],
       () => this.values[file] ? cardsOf(this.values[file], state) : []);
     frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
-    const listed = file ? effects(() => this.update(state)) : [];
     put(this.gallery, [file, listed.length, this.filter, jobsOf(state, "add")], () => listed.length ? galleryOf(this, state, listed) : []);
   },
   first(state) {
@@ -101,11 +107,19 @@ function takenOut(state, axis) {
 function switchOf(state, axis, name, on) {
   return h("button", { class: "switch", role: "switch", "aria-checked": String(on), "aria-label": `${name} of axis ${axis}`,
     disabled: busy(state, "remove") || busy(state, "add"), title: on ? "Take it out and fit the others" : "Add it again and fit",
-    onclick: () => run(on ? "remove" : "add", name, "--axis", axis) }, on ? "on" : "off");
+    onclick: () => switched(state, axis, name, on) }, on ? "on" : "off");
+}
+
+/** Of what was taken out last the model before is the one with it. */
+function switched(state, axis, name, on) {
+  const last = state.models.at(-1);
+  if (on) run("remove", name, "--axis", axis);
+  else if (last.removed === name && last.errors[0]?.axis === axis) run("undo");
+  else run("add", name, "--axis", axis);
 }
 
 function card(name, values, fixed, toggle = null) {
-  return h("div", { class: "card" }, h("h3", {}, name, toggle), h("table", {}, h("tbody", {}, ...values.map(v => h("tr", {},
+  return h("div", { class: "card" }, h("h3", {}, name, toggle), meaning(name), h("table", {}, h("tbody", {}, ...values.map(v => h("tr", {},
     h("td", { title: v.meaning }, fixed === null ? v.name.replaceAll("_", " ") : v.meaning || v.name), h("td", {}, h("b", {}, v.shown),
       v.band ? h("div", { class: "soft" }, `90 %: ${v.band[0]} to ${v.band[1]}`) : null,
       fixed?.includes(v.name) ? h("div", { class: "soft" }, "held") : null))))));
@@ -117,7 +131,7 @@ function galleryOf(screen, state, listed) {
   return [h("details", { open: screen.open, ontoggle: event => { screen.open = event.target.open; } },
     h("summary", {}, `Add an effect by hand (${listed.length} in the catalogue)`),
     h("div", { class: "row" }, h("label", {}, "Search", h("input", { id: "filter", value: screen.filter, type: "search",
-      oninput: event => { screen.filter = event.target.value; screen.update(state); } }))),
+      oninput: event => { screen.filter = event.target.value; screen.update(stateNow()); } }))),
     h("div", { class: "cards" }, ...fitting.map(e => h("div", { class: "card" }, h("h3", {}, e.name), h("p", {}, e.summary),
       h("p", { class: "soft" }, e.equation), h("p", { class: "soft" }, `Seen by: ${e.excited_by}`),
       h("button", { disabled: busy(state, "add"), "aria-label": `Add ${e.name}`, onclick: () => run("add", e.name) }, "Add")))))];
@@ -134,7 +148,7 @@ const compare = {
   },
   update(state) {
     put(this.top, [state.models.length, jobsOf(state, "compare"), jobsOf(state, "view")], () => state.models.length ? [
-      h("p", {}, "Where the force of the model differs from that of the machine, on the test logs: by time, position, speed and direction. What is marked there is marked in the replay below."),
+      h("p", {}, "Where the force of the model differs from that of the machine, on the test logs: by time, position, speed and direction. What is marked there is marked in the replay, where that is shown."),
       h("div", { class: "row" }, button("Compare the present model", "compare", ["compare"], state, true),
         button("Show it move in 3D", "view", ["view"], state, false, "compare"))] : [needsModel()]);
     frames(this.page, last(state, "compare")?.page, "Comparison of model and machine");
@@ -159,15 +173,22 @@ const diagnose = {
     put(this.top, [state.models.length, jobsOf(state, "diagnose")], () => state.models.length ? [
       button("Find what is missing", "diagnose", ["diagnose"], state, true)] : [needsModel()]);
     put(this.live, job?.progress ?? null, () => job ? liveOf(job.progress ?? "begins") : []);
-    const entry = last(state, "diagnose"), found = answer(entry?.file, () => this.update(state));
+    const entry = last(state, "diagnose"), found = answer(entry?.file, () => this.update(stateNow()));
+    const listed = found ? effects(() => this.update(stateNow())) : [];
     const old = entry ? null : state.answers.filter(a => a.command.split(" ")[1] === "diagnose").at(-1);
-    put(this.answer, [found ? entry.file : null, old?.file, jobsOf(state, "add")], () => found ? answerOf(found, state) :
-      old ? [h("p", { class: "soft" }, `${state.models.at(-1)?.file} was not diagnosed yet; the page below is about ${old.model}.`)] : []);
-    const listed = found ? effects(() => this.update(state)) : [];
+    put(this.answer, [found ? entry.file : null, old?.file, listed.length, jobsOf(state, "add")], () => found ? answerOf(found, state) :
+      old ? [sinceThen(state, old)] : []);
     put(this.why, [found ? entry.file : null, listed.length, this.asked, jobsOf(state, "add")], () => listed.length ? whyOf(this, state, found, listed) : []);
     frames(this.page, (entry ?? old)?.page, "The diagnosis with its evidence");
   },
 };
+
+/** What the present model is, where the last diagnosis was of one before it. */
+function sinceThen(state, old) {
+  const now = state.ledger.at(-1);
+  return h("div", { class: "card lead" }, h("h3", {}, `${now.file} = ${now.made}`), ...now.errors.map(e => h("p", {}, e.told)),
+    h("p", { class: "soft" }, `It was not diagnosed yet: the page below is about ${old.model}.`), h("a", { class: "next", href: "#compare" }, "Compare it with the machine"));
+}
 
 function liveOf(progress) {
   const [where, ahead] = progress.split("; ahead: ");
@@ -202,10 +223,10 @@ function bodyOf(b) {
 }
 
 function findingOf(f, axis, state) {
-  const parts = [h("h3", {}, f.effect ?? f.kind), h("p", {}, STATES[f.state] ?? f.state ?? "",
-    f.confidence ? `; ${percent(f.confidence)} of such answers were right` : "")];
-  if (f.explains !== null) parts.push(bar("explains of the error", f.explains));
-  if (f.control !== null && f.control !== undefined) parts.push(bar("shifted, which is not real", f.control));
+  const parts = [h("h3", {}, f.effect ?? f.kind), meaning(f.effect), h("p", {}, STATES[f.state] ?? f.state ?? "",
+    f.confidence ? `; of answers as well supported ${percent(f.confidence)} were right on machines whose lack is known` : "")];
+  if (f.explains !== null) parts.push(bar("of the squared error", f.explains));
+  if (f.control !== null && f.control !== undefined) parts.push(bar("shifted in time, by chance", f.control));
   if (f.indistinguishable_from?.length) parts.push(h("p", { class: "warn-text" }, `The logs cannot tell it from ${f.indistinguishable_from.join(", ")}.`));
   if (f.effect && f.kind === "missing") parts.push(h("button", { disabled: busy(state, "add"), "aria-label": `Add ${f.effect}`,
     onclick: () => run("add", f.effect, "--axis", axis) }, "Add this one"));
@@ -215,7 +236,7 @@ function findingOf(f, axis, state) {
 function whyOf(screen, state, found, listed) {
   const chosen = screen.asked;
   const names = listed.map(e => e.name);
-  const select = h("select", { id: "why", onchange: event => { screen.asked = event.target.value; screen.update(state); } },
+  const select = h("select", { id: "why", onchange: event => { screen.asked = event.target.value; screen.update(stateNow()); } },
     h("option", { value: "" }, "choose an effect"), ...names.map(n => h("option", { value: n, selected: n === chosen }, n)));
   const told = chosen ? axesOf(found).map(a => h("div", { class: "card" }, h("h3", {}, `${chosen} on axis ${a.axis}`),
     ...reasonsOf(a, chosen, listed.find(e => e.name === chosen)),
@@ -252,7 +273,7 @@ const experiment = {
     put(this.top, [state.models.length, jobsOf(state, "plan")], () => state.models.length ? [
       h("p", {}, "The motion that decides best between what the recordings cannot tell apart."),
       button("Plan it", "plan", ["plan"], state, true)] : [needsModel()]);
-    const entry = last(state, "plan"), found = answer(entry?.file, () => this.update(state));
+    const entry = last(state, "plan"), found = answer(entry?.file, () => this.update(stateNow()));
     put(this.answer, [found ? entry.file : null], () => found ? planOf(found) : []);
     const file = state.experiments.at(-1)?.file;
     put(this.made, [file, jobsOf(state, "simulate"), state.runs], () => file ? experimentOf(file, state) : []);
