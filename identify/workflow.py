@@ -318,6 +318,7 @@ def diagnose(
         not_planned=not_planned,
         left_over={axis: region for axis, region in regions.items() if region},
         bodies=bodies,
+        disputed=away.disputed,
         recording=given.recording,
         model=better,
         free_runs={} if better is model else free_run_errors(better, prepared, comparing),

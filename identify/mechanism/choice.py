@@ -74,6 +74,22 @@ class Choice:
         found = [self._moved(g, best) for g in best]
         return sorted(found, key=lambda m: -m.score.part)
 
+    def disputed(self) -> dict[str, tuple[str, ...]]:
+        """Bodies that the training logs by themselves prove and the others refuse; by name, the
+        logs that tell another change of one.
+        """
+        out = {}
+        groups = self.regression.groups
+        for g in (g for g in self._grown() if groups[g].body is not None):
+            alone = frozenset({g})
+            own = self._score(g, alone)
+            if own.accepted or not replace(own, other=own.training).accepted:
+                continue
+            logs = self.regression.disagreeing([g], self.solution(alone), g)
+            if logs:
+                out[groups[g].place] = tuple(logs)
+        return out
+
     def _grown(self, barred: Chosen = frozenset()) -> Chosen:
         """The best set of all that were grown; barred: groups that are in none."""
         groups = self.regression.groups

@@ -38,7 +38,8 @@ class Departures:
     """What must move, and the joints beside the bodies as they were found.
 
     names: of the laws by which groups are told. groups: all that were asked; none of plain axes,
-    and where only noise is left of every joint.
+    and where only noise is left of every joint. disputed: where nothing moved, bodies of which the
+    logs tell each another change, and those logs.
     """
 
     datasets: Mapping[str, Dataset]
@@ -47,6 +48,7 @@ class Departures:
     bodies: tuple[WrongBody, ...] = ()
     names: Mapping[What, str] = field(default_factory=dict)
     groups: Sequence[Group] = ()
+    disputed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def offered(self, catalogue: Catalogue, axis: str) -> Catalogue:
         """The effects that a diagnosis of that axis may name.
@@ -177,10 +179,13 @@ def departures_of(
     axes = {axis: judged.fit.axis for axis, judged in before.items()}
     reaches = {axis: _reach(judged.dataset) for axis, judged in before.items()}
     regression = _regression(before, groups_of(bodies, axes, reaches))
-    moved = Choice(regression).moved()
+    choice = Choice(regression)
+    moved = choice.moved()
+    disputed = {} if moved else choice.disputed()
     names = {what: what.named(catalogue) for what in What}
     beside = {axis: replace(own, beside_bodies=True) for axis, own in datasets.items()}
-    found = Departures(beside, fits, moved, names=names, groups=regression.groups)
+    groups = regression.groups
+    found = Departures(beside, fits, moved, names=names, groups=groups, disputed=disputed)
     return _with_bodies(found, regression)
 
 

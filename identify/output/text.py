@@ -36,6 +36,7 @@ from identify.output.words.next_step import (
     Source,
     all_not_run_in_words,
     body_in_words,
+    disputed_in_words,
     errors_of_step,
     experiment_in_words,
     gap_in_words,
@@ -155,7 +156,8 @@ def diagnose_text(result: Diagnosis, source: Source = UNKNOWN) -> str:
     """
     lines = body_in_words(result, source)
     lines[1:] = [f"  {line}" for line in lines[1:]]
-    lines = [*read_otherwise_in_words(result.recording), *lines]
+    first = [*read_otherwise_in_words(result.recording), *disputed_in_words(result.disputed)]
+    lines = [*first, *lines]
     for axis, d in result.axes.items():
         said, units, tested = said_of(result, axis), d.base.axis.units, d.tested
         named = f" Missing: {named_in_words(d)}." if d.named else ""

@@ -239,6 +239,7 @@ class Diagnosis(Pictured):
     ambiguous axis without next experiment, why the machine can run none. left_over: for an axis
     with a remainder, where that is largest. bodies: of a mechanism, those whose inertia is not
     that of its file, the one that explains most first; the diagnoses are with them as found.
+    disputed: bodies of which the logs tell each another change, and those logs; then none is found.
     recording: how the logs of a mechanism are another than its file needs; all is of them so read.
     model: with everything that was found, fitted together, and how its errors fell. free_runs: its
     free-running position error, axis -> training log -> m RMS; none where nothing was found.
@@ -254,6 +255,7 @@ class Diagnosis(Pictured):
     not_planned: Mapping[str, str] = field(default_factory=dict)
     left_over: Mapping[str, Region] = field(default_factory=dict)
     bodies: tuple[WrongBody, ...] = ()
+    disputed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     recording: Recording | None = None
     model: MachineModel = field(kw_only=True)
     free_runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

@@ -352,6 +352,8 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
     """Of a mechanism, in what its recording is another than its file needs."""
     bodies: list[BodyEntry]
     """All bodies of which something is told."""
+    disputed: dict[str, list[str]] = Field({})
+    """By body, the logs that tell another change of it than the training logs do."""
     model: str
     """The model with everything that was found, as the text of its TOML file."""
     mujoco: str | None
@@ -371,7 +373,14 @@ def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     mujoco = model.mjcf if body else None
     written = {"model": format_model(model), "mujoco": mujoco}
     return DiagnosisAnswer.of(
-        leading, axes=axes, body=body, recording=recording, bodies=bodies, **written, **more
+        leading,
+        axes=axes,
+        body=body,
+        recording=recording,
+        bodies=bodies,
+        disputed=result.disputed,
+        **written,
+        **more,
     )
 
 

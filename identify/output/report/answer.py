@@ -10,7 +10,12 @@ from identify.output.report.page import AnswerBlock, Block, Listing, Tile, Tone
 from identify.output.report.subject import AxisView, Subject
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
-from identify.output.words.next_step import Source, body_in_words, next_step_in_words
+from identify.output.words.next_step import (
+    Source,
+    body_in_words,
+    disputed_in_words,
+    next_step_in_words,
+)
 from identify.output.words.recording import read_otherwise_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
@@ -28,6 +33,9 @@ def cards(view: AxisView) -> list[Block]:
         said, *others = read_otherwise_in_words(diagnosis.recording)
         headline = "The recording is not what the model needs"
         first.append(AnswerBlock(headline, said, [], others, Tone.STRONG))
+    if diagnosis.disputed:
+        said, *others = disputed_in_words(diagnosis.disputed)
+        first.append(AnswerBlock("The logs disagree", said, [], others, Tone.STRONG))
     if diagnosis.body is not None:
         first.append(_body(diagnosis, diagnosis.body, view.subject.source))
     return [*(first if view is view.subject.views[0] else []), own]

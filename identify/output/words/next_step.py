@@ -299,6 +299,16 @@ def _of(body: WrongBody, among: Sequence[WrongBody]) -> str:
     return f"body {body.body}" if among[1:] else "the body"
 
 
+def disputed_in_words(disputed: Mapping[str, Sequence[str]]) -> list[str]:
+    """That the logs tell each another change of a body, so that none can be told."""
+    return [
+        f"The logs disagree about body {body}: {listed(logs)} tell another change of its inertia "
+        "than the training logs, so that the load is not the same in all, or is held another way; "
+        "diagnose them one by one."
+        for body, logs in disputed.items()
+    ]
+
+
 def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
     """That a body is not as its file has it, by how much, and the errors without and with it."""
     file, name = model.mjcf_name, " or ".join((found.body, *found.tied))

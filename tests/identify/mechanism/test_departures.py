@@ -15,6 +15,7 @@ from benchmarks.second_simulator.arms import Changed, drawn, inertia, log_of
 from identify.analysis.first_model import first_model
 from identify.mechanism.bodies import possible
 from identify.mechanism.departures import departures_of
+from identify.output.as_json import json_of
 from identify.selection.trying import try_effect
 from identify.selection.what import What
 from identify.workflow import diagnose, fit
@@ -94,10 +95,10 @@ def test_logs_of_a_load_that_is_held_another_way_disagree():
     logs = [{f"{i}": log_of(ARM, way, 50 + i, 8.0)} for i, way in enumerate(ways)]
     model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", ARM.text))
     found = diagnose(model, *logs, catalogue=FEW)
-    (body,) = found.bodies
-    assert body.disagreeing
-    assert body.confidence < 0.9
-    assert "The logs disagree about it" in str(found)
+    assert not found.bodies
+    assert found.disputed == {"link3": ("1",)}
+    assert str(found).startswith("The logs disagree about body link3: 1 tell another change")
+    assert json_of(found)["disputed"] == {"link3": ["1"]}
 
 
 def test_a_body_has_the_nearest_parameters_that_it_can_have():
