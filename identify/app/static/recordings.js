@@ -198,7 +198,7 @@ function rolesOf(state) {
 }
 
 function listOf(state, check) {
-  return [state.recordings.length > 1 ? rolesOf(state) : null, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "Course", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
+  return [state.recordings.length > 1 ? rolesOf(state) : null, h("div", { class: "scroll" }, h("table", { class: "taken" }, h("thead", {}, h("tr", {}, ...["Recording", "What it is for", "Course", "What physics says", "What the check says", ""].map(t => h("th", { scope: "col" }, t)))),
     h("tbody", {}, ...state.recordings.map((r, k) => h("tr", {},
       h("td", {}, h("b", {}, r.sources[0] ?? r.file), h("div", { class: "soft" }, r.sources.length ? r.file : "")),
       h("td", {}, h("select", { id: `role-${k}`, "aria-label": `role of ${r.file}`, onchange: e => run("project", "role", r.file, "--to", e.target.value) },
