@@ -37,9 +37,7 @@ from twin.threads import VARIABLES
 
 T = TypeVar("T")
 R = TypeVar("R")
-SHARES = (
-    4  # tasks a worker that work is cut into: what is left at the end keeps one alone, a quarter
-)
+SHARES = 4  # tasks a worker that work is cut into: at its end one alone has a quarter at most
 AHEAD = 4  # tasks a worker has waiting, so that none stands still while an answer travels
 TIMEOUT = 10.0  # s for a scheduler to answer
 RETRIES = 3  # of a task whose worker was lost
