@@ -115,9 +115,8 @@ def row(case: Case) -> Row:
     sound = [log for name, log in ordered if not (case.spoiled and name == case.which)]
     out["provable"] = is_provable(plant, plain, sound[:2], sound[2:])
     checked = {name: check_log(log) for name, log in ordered}
-    faults = SPOILT - (
-        {Fault.LAG} if plant.lag or plant.delay else set()
-    )  # which all logs then have
+    of_all = {Fault.LAG} if plant.lag or plant.delay else set()  # which every log then has
+    faults = SPOILT - of_all
     faulty = [n for n, c in checked.items() if any(f.fault in faults for f in c.findings)]
     refused = [name for name, report in checked.items() if not report.ok]
     odd = found.axes[AXIS].dataset.odd

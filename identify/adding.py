@@ -14,7 +14,7 @@ from identify.mechanism.bodies import corrected
 from identify.mechanism.departures import departures_of
 from identify.output.words.next_step import axis_in_words, notes_in_words
 from identify.output.words.recording import read_otherwise_in_words
-from identify.results.results import (
+from identify.results.grown import (
     Addition,
     AllAdded,
     CorrectedBody,
@@ -22,8 +22,8 @@ from identify.results.results import (
     addition,
     removal,
     step_of_body,
-    steps_together,
 )
+from identify.results.results import steps_together
 from identify.selection.acceptance import Judged, score
 from identify.selection.candidates import Candidate
 from identify.selection.nonparametric import fit_nonparametric, physics_alone

@@ -56,7 +56,7 @@ from identify.validation.comparison import (
     position_errors,
     side_by_side,
 )
-from identify.validation.misfit_maps import worst_region
+from identify.validation.misfit_maps import Region, worst_region
 from identify.validation.tracking import tracking, unmoved
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
@@ -303,7 +303,6 @@ def diagnose(
         final.forget()  # it is the last that asked for the matrices of all logs
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
-    regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
     prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
     better = with_all_found(model, axes, summaries, bodies)
     comparing = partial(progress, "comparing with all that was found")
@@ -316,13 +315,19 @@ def diagnose(
         refits={axis: refit(result.given.axes[axis], d.base, known) for axis, d in axes.items()},
         not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
-        left_over={axis: region for axis, region in regions.items() if region},
+        left_over=_left_over(axes),
         bodies=bodies,
         disputed=away.disputed,
         recording=given.recording,
         model=better,
         free_runs={} if better is model else free_run_errors(better, prepared, comparing),
     )
+
+
+def _left_over(axes: Mapping[str, AxisDiagnosis]) -> dict[str, Region]:
+    """Where what is unexplained is largest, by axis."""
+    regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
+    return {axis: region for axis, region in regions.items() if region}
 
 
 def _recording_of(model: MachineModel, logs: Mapping[str, Log]) -> Recording | None:

@@ -20,8 +20,8 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.mechanism.bodies import WrongBody
+from identify.results.grown import Addition
 from identify.results.results import (
-    Addition,
     AxisSummary,
     Comparison,
     Diagnosis,

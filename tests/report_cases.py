@@ -10,13 +10,8 @@ from pathlib import Path
 from identify import adding, workflow
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.results import (
-    Addition,
-    Comparison,
-    Diagnosis,
-    summary_of,
-    with_all_found,
-)
+from identify.results.grown import Addition
+from identify.results.results import Comparison, Diagnosis, summary_of, with_all_found
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import Catalogue, load_catalogue
 from twin.logs import Log

@@ -43,12 +43,7 @@ from twin.telling import heard
 if TYPE_CHECKING:
     from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.next_step import Source
-    from identify.results.results import (
-        Comparison,
-        Diagnosis,
-        FitResult,
-        SimulationFit,
-    )
+    from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
     from twin.effects import Catalogue
     from twin.model.machine import MachineModel
 
@@ -267,9 +262,7 @@ def add(
         call = adding.add_shape if shape else adding.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
     done: Done[Any] = with_logs(job, machine, logs, holdout, test, fits=True)
-    failed = tried(partial(_save_with_bodies, done.result.model, out, machine))
-    said = said_of(done.result, done.warnings, done.result.kept, left_out=done.left_out)
-    return replace(said, unwritten=failed)
+    return _with_model(done, out, machine, done.result.kept)
 
 
 @app.command()
@@ -292,9 +285,13 @@ def remove(
 
     machine, _ = loaded(model, effects)
     job = partial(adding.remove, effect, axis=axis, test_function=test_function)
-    done = with_logs(job, machine, logs, holdout, test, fits=True)
-    failed = tried(partial(_save_with_bodies, done.result.model, out, machine))
-    said = said_of(done.result, done.warnings, left_out=done.left_out)
+    return _with_model(with_logs(job, machine, logs, holdout, test, fits=True), out, machine, True)
+
+
+def _with_model(done: Done[Any], out: Path, given: MachineModel, fine: bool) -> Said:
+    """What is said of a result whose model is written."""
+    failed = tried(partial(_save_with_bodies, done.result.model, out, given))
+    said = said_of(done.result, done.warnings, fine, left_out=done.left_out)
     return replace(said, unwritten=failed)
 
 

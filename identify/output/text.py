@@ -51,15 +51,12 @@ from identify.output.words.next_step import (
 from identify.output.words.recording import read_otherwise_in_words
 from identify.output.words.verdict import all_found, named_in_words
 from identify.printed import Printed, figure_of, html_of, report_of, save_of, text_of
+from identify.results.grown import Addition, AllAdded, CorrectedBody, Removal
 from identify.results.results import (
-    Addition,
-    AllAdded,
     Comparison,
-    CorrectedBody,
     Diagnosis,
     Feedforward,
     FitResult,
-    Removal,
     SimulationFit,
     refitted,
 )

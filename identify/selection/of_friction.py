@@ -40,24 +40,29 @@ def is_of_friction(less: Judged, final: Judged, effect: Effect) -> bool:
     if not effect.delays or not rubbing.effects:
         return False
 
+    own_rates = [_rates(rubbing, log) for log in less.fit.logs]
+
     def columns(logs: Sequence[PreparedLog]) -> list[Array]:
-        first = [_rates(rubbing, log)[:, 0] for log in logs]
+        each = own_rates if logs is less.fit.logs else [_rates(rubbing, log) for log in logs]
+        first = [rates[:, 0] for rates in each]
         second = (rate(one, _period(log)) for one, log in zip(first, logs, strict=True))
         return [np.column_stack(both) for both in zip(first, second, strict=True)]
 
     own = with_unit_penalty(columns, less.fit)
     alone = ControlTest.beside(less).part(own, sticking=sticks(less.fit.axis))
-    return alone >= AS_MUCH * score(less, final).part or not _is_shared(less, rubbing)
+    return alone >= AS_MUCH * score(less, final).part or not _is_shared(
+        less, np.concatenate(own_rates)
+    )
 
 
-def _is_shared(less: Judged, rubbing: AxisModel) -> bool:
+def _is_shared(less: Judged, rates: Array) -> bool:
     """Whether the command without what overcomes friction is late as well, where all of it is.
 
-    How late each is by its rate, beside the free parameters of the fit: both by themselves, and all
-    of the command together.
+    rates (n, 2): N/s, of both, of the training logs. How late each is by its rate, beside the free
+    parameters of the fit: both by themselves, and all of the command together.
     """
-    fit, logs = less.fit, less.dataset.training
-    pairs = np.concatenate([_rates(rubbing, log) for log in logs])[fit.kept]
+    fit = less.fit
+    pairs = rates[fit.kept]
     late = unabsorbed(np.column_stack([pairs, pairs.sum(axis=1)]), fit.basis)
     (_, rest), error = _lateness(late[:, :2], fit.unabsorbed)
     (every,), _ = _lateness(late[:, 2:], fit.unabsorbed)

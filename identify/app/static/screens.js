@@ -39,6 +39,8 @@ function button(text, kind, words, state, lead = false, screen = "do") {
 }
 
 const ofExperiment = answer => answer.command.startsWith("twin view experiments/");
+const replay = (place, state) =>
+  frames(place, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
 const needsModel = () => h("p", {}, "There is no model yet. ", h("a", { href: "#model" }, "Propose a first model"), ".");
 const jobsOf = (state, kind) => state.jobs.filter(j => j.words[0] === kind).map(j => [j.number, j.state]);
 
@@ -66,7 +68,7 @@ const model = {
     const listed = file ? effects(() => this.update(stateNow())) : [];
     put(this.cards, [this.values[file] ?? null, listed.length, jobsOf(state, "remove"), jobsOf(state, "add")],
       () => this.values[file] ? cardsOf(this.values[file], state) : []);
-    frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
+    replay(this.view, state);
     put(this.gallery, [file, listed.length, this.filter, jobsOf(state, "add")], () => listed.length ? galleryOf(this, state, listed) : []);
   },
   first(state) {
@@ -152,7 +154,7 @@ const compare = {
       h("div", { class: "row" }, button("Compare the present model", "compare", ["compare"], state, true),
         button("Show it move in 3D", "view", ["view"], state, false, "compare"))] : [needsModel()]);
     frames(this.page, last(state, "compare")?.page, "Comparison of model and machine");
-    frames(this.view, last(state, "view", undefined, a => !ofExperiment(a))?.page, "The machine in 3D, as measured and as modelled");
+    replay(this.view, state);
   },
 };
 

@@ -10,7 +10,7 @@ from identify.dataset.body import INERTIAL
 from identify.dataset.dataset import Role
 from identify.mechanism.bodies import WrongBody
 from identify.output.answers import Answer, Entry, Number, answer_of, read
-from identify.results.results import CorrectedBody
+from identify.results.grown import CorrectedBody
 from twin.model.machine import MachineModel
 
 

@@ -25,7 +25,8 @@ from identify.output.words.diagnosis import (
     why_not,
 )
 from identify.output.words.findings import pairs_in_words
-from identify.results.results import Addition, AllAdded, Diagnosis, Removal
+from identify.results.grown import Addition, AllAdded, Removal
+from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind

@@ -41,7 +41,7 @@ from identify.output.words.fit import (
     nonparametric_in_words,
 )
 from identify.output.words.next_step import errors_of_step
-from identify.results.results import Addition
+from identify.results.grown import Addition
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding

@@ -11,7 +11,8 @@ from identify.dataset.dataset import Role
 from identify.output.words.diagnosis import Said, said_of
 from identify.output.words.next_step import UNKNOWN, Source, names_of
 from identify.output.words.verdict import all_found
-from identify.results.results import UNTOLD, Addition, AxisSummary, Comparison, Diagnosis, OnMachine
+from identify.results.grown import Addition
+from identify.results.results import UNTOLD, AxisSummary, Comparison, Diagnosis, OnMachine
 from identify.results.signals import Signals, signals_of
 from identify.rules import RULE
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

@@ -19,7 +19,8 @@ from identify.experiment_design.rival_hypotheses import STRENGTH
 from identify.mechanism.bodies import WrongBody
 from identify.output.numbers import DisplayUnit, arrow, listed, number, percent, quantity, with_band
 from identify.output.words.fit import moved_in_words, nonparametric_in_words
-from identify.results.results import Addition, Diagnosis
+from identify.results.grown import Addition
+from identify.results.results import Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from twin.effects import load_catalogue
 from twin.experiments.file import in_short

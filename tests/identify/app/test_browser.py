@@ -51,22 +51,33 @@ def test_the_first_screen_by_keyboard_and_a_file_that_is_none(tmp_path):
             assert field.evaluate("e => e.ariaLabel || e.labels?.length || e.textContent.trim()")
 
 
+def imported(context, address: str, files: list[str]):
+    """The page with these recordings taken in."""
+    page = context.new_page()
+    page.goto(address)
+    page.set_input_files("#files", files)
+    page.click("#import-all")
+    page.wait_for_selector("text=force explained to")
+    return page
+
+
+def propose(page) -> None:
+    """Propose a first model."""
+    page.click("nav >> text=Model")
+    page.click("#new")
+    page.wait_for_selector("text=Fit its values")
+
+
 @pytest.mark.slow  # a diagnosis, twice
 def test_the_walk_from_three_files_to_the_added_effect(tmp_path):
     files = [str(recorded(tmp_path / f"run{k}.csv", 5.0 + k, k)) for k in range(3)]
     folder = tmp_path / "machine"
     folder.mkdir()
     with served(folder) as address, browsed() as context:
-        page = context.new_page()
-        page.goto(address)
-        page.set_input_files("#files", files)
-        page.click("#import-all")
-        page.wait_for_selector("text=force explained to")
+        page = imported(context, address, files)
         other = context.new_page()  # a second tab, which only looks
         other.goto(address)
-        page.click("nav >> text=Model")
-        page.click("#new")
-        page.wait_for_selector("text=Fit its values")
+        propose(page)
         page.click("nav >> text=Diagnose")
         page.click("#do-diagnose")
         page.wait_for_selector("#stop")
@@ -101,14 +112,8 @@ def test_what_is_marked_in_the_comparison_is_marked_in_the_replay(tmp_path):
     folder = tmp_path / "machine"
     folder.mkdir()
     with served(folder) as address, browsed() as context:
-        page = context.new_page()
-        page.goto(address)
-        page.set_input_files("#files", files)
-        page.click("#import-all")
-        page.wait_for_selector("text=force explained to")
-        page.click("nav >> text=Model")
-        page.click("#new")
-        page.wait_for_selector("text=Fit its values")
+        page = imported(context, address, files)
+        propose(page)
         page.click("nav >> text=Compare")
         page.click("#do-compare")
         page.click("#compare-view")

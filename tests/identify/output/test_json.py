@@ -29,7 +29,7 @@ from identify.output.answers.machine import EffectAnswer, check_answer, laws_ans
 from identify.output.as_json import FILE, json_of, schema_text
 from identify.output.report import sections
 from identify.printed import Printed, text_of
-from identify.results.results import CorrectedBody
+from identify.results.grown import CorrectedBody
 from identify.selection.diagnosis import Verdict
 from identify.validation.agreement import Agreement
 from twin.checks import CheckReport, Fault, LogFinding, Severity

@@ -18,7 +18,7 @@ from identify.output.words.next_step import (
     gap_in_words,
     notes_in_words,
 )
-from identify.results.results import Addition
+from identify.results.grown import Addition
 from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests
 from twin.model.machine import HistoryStep

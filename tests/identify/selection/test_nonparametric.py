@@ -22,7 +22,8 @@ from identify.estimation.least_squares import RIDGE, ROUNDING, solve
 from identify.estimation.splines import STIFFNESS, Linearised, choose_stiffness
 from identify.estimation.variable_projection import absent_effects
 from identify.output.words.fit import nonparametric_in_words
-from identify.results.results import Addition, FitResult
+from identify.results.grown import Addition
+from identify.results.results import FitResult
 from identify.selection.nonparametric import (
     _filled,
     fit_nonparametric,

@@ -33,7 +33,8 @@ from identify.output import as_json, text
 from identify.output.answers import plain
 from identify.output.report import write_report
 from identify.output.report.subject import Subject
-from identify.results.results import Addition, Diagnosis, FitResult
+from identify.results.grown import Addition
+from identify.results.results import Diagnosis, FitResult
 from twin.checks import check_log
 from twin.effects import Catalogue
 from twin.errors import InputError
