@@ -25,6 +25,7 @@ import numpy as np
 from identify.dataset.drive import knows_rounding
 from identify.dataset.motion import Motion
 from identify.dataset.noise import Noise, noises_of
+from identify.dataset.path import Slip
 from identify.dataset.prepared_log import (
     PreparedLog,
     motor_gain,
@@ -209,8 +210,10 @@ def _of_path(axis: AxisModel, log: PreparedLog) -> float:
     if not told.any():
         return 0.0
     table = on_blocks(own)
-    paths = (motion.path, motion.path.of_every_second(0), motion.path.of_every_second(1))
-    every, one, other = (total_force(table, replace(motion, path=path)) for path in paths)
+    free = np.zeros_like(motion.path.stands)
+    beside = (Slip(half - motion.path.velocity, free) for half in motion.path.by_halves)
+    every = total_force(table, motion)
+    one, other = (total_force(table, replace(motion, slip=slip)) for slip in beside)
     noise = log.test_function.mean(0.5 * (one - other))[told]
     missed = log.test_function.mean(0.5 * (one + other) - every)[told] / 3.0
     return float(np.mean(noise**2 + missed**2))

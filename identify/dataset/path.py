@@ -92,15 +92,22 @@ class Path:
         """The path behind readings with an error (n * samples,) m."""
         return replace(self, readings=self.readings - np.append(error, error[-1]))
 
-    def of_every_second(self, first: int) -> Path:
-        """The path that every second reading tells, from the first or the second (0, 1) on."""
+    @cached_property
+    def by_halves(self) -> Array:
+        """(2, n) m/s over each block of the paths that every second reading tells.
+
+        From the first, and from the second reading on.
+        """
+        return np.stack([self._of_every_second(first).velocity for first in (0, 1)])
+
+    def _of_every_second(self, first: int) -> Path:
         fewer, between_them = self.readings.copy(), slice(1 + first, -1, 2)
         fewer[between_them] = 0.5 * (fewer[first:-2:2] + fewer[2 + first :: 2])
         return replace(self, readings=fewer)
 
     def forget(self) -> None:
         """Let go of what is made of the readings."""
-        for name in ("velocity", "stands", "_still"):
+        for name in ("velocity", "by_halves", "stands", "_still"):
             self.__dict__.pop(name, None)
 
 

@@ -316,16 +316,16 @@ def _otherwise(
 
 def _step(columns: Array, force: Array) -> Array:
     """The strengths (k,) of unit columns that explain a force (n,) N, with a weak penalty."""
-    weak = RIDGE * np.eye(columns.shape[1])
-    rows = np.concatenate([columns, weak])
-    return np.asarray(np.linalg.lstsq(rows, np.pad(force, (0, len(weak))), rcond=None)[0], float)
+    weak = RIDGE**2 * np.eye(columns.shape[1])
+    return np.asarray(np.linalg.solve(columns.T @ columns + weak, columns.T @ force), float)
 
 
 def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     """Which rows (n,) of a log are in a state where others have been: in one cell of a grid."""
-    cell = 0.5  # of the RMS of each coordinate
+    cell, most = 0.5, 1 << 15  # of the RMS of each coordinate; cells on either side of its zero
     states = np.concatenate([own.states, *(r.states for r in others)])
-    cells = np.unique(np.floor(states / cell), axis=0, return_inverse=True)[1].reshape(-1)
+    places = np.clip(np.floor(states / cell), -most, most - 1).astype(np.int64) + most
+    cells = np.bitwise_or.reduce(places << np.array([0, 16, 32, 48]), axis=1)
     return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
 

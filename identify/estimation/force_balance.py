@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import product
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,8 +121,13 @@ def _load(axis: AxisModel, log: PreparedLog) -> Array:
     In each block, from the means by test functions. Not the measured command: of that friction in
     its proportion takes noise as well, and "explains" it.
     """
+    return _load_of(Valued.of(_loading(axis)), axis.mass, log)
+
+
+@lru_cache(maxsize=16)  # whatever is walked at the same values of an axis bears the same load
+def _load_of(loading: Valued, mass: float, log: PreparedLog) -> Array:
     bodies = log.fine.mean(log.motion.raw[1]) - log.command
-    asked = axis.mass * log.acceleration - averaged_force(_loading(axis), [log]) + bodies
+    asked = mass * log.acceleration - averaged_force(loading.axis, [log]) + bodies
     return _sharpened(asked[None], log)[0]
 
 
@@ -135,9 +140,14 @@ def _loading(axis: AxisModel) -> AxisModel:
 
 def _sharpened(means: Array, log: PreparedLog) -> Array:
     """Forces (m, k) N by blocks whose means by test functions are these (m, n) N."""
+    time, middles = log.motion.time, log.time
+    if len(middles) < 2:
+        return np.repeat(means, len(time), axis=1)
+    left = np.clip(np.searchsorted(middles, time) - 1, 0, len(middles) - 2)
+    share = np.clip((time - middles[left]) / (middles[left + 1] - middles[left]), 0.0, 1.0)
 
     def on_blocks(each: Array) -> Array:
-        return np.stack([np.interp(log.motion.time, log.time, own) for own in each])
+        return each[:, left] + share * (each[:, left + 1] - each[:, left])
 
     out = on_blocks(means)
     for _ in range(2):  # averaging smooths the force: add back what it removed
@@ -276,18 +286,12 @@ def changes(
     """
     logs = settled(axis, logs)
     asked = np.ones(sum(map(len, logs)), dtype=bool) if kept is None else kept
-    own = split_by_log(asked, logs)
-    ends = np.cumsum([np.count_nonzero(some) for some in own])
-    spans = [slice(end - np.count_nonzero(some), end) for end, some in zip(ends, own, strict=True)]
-    out = np.empty((len(where), ends[-1]), order="C" if kept is None else "F")
-
-    def walk(job: tuple[_Walk, tuple[PreparedLog, NDArray[np.bool_], slice]]) -> None:
-        (rows, along), (log, some, span) = job
-        out[rows, span] = along(log)[:, some]
-
-    spread(walk, product(_walks(axis, where, steps), zip(logs, own, spans, strict=True)))
     if _borne(axis):
-        out += _by_load(axis, logs, where, steps)[:, asked]
+        out = _walked(axis, logs, where, steps)
+        out += _by_load(axis, logs, where, steps, out)
+        out = out[:, asked]
+    else:
+        out = _walked(axis, logs, where, steps, asked, order="C" if kept is None else "F")
     out *= np.concatenate([log.told for log in logs])[asked]
     gain = motor_gain(axis, logs)
     driving = [j for j, c in enumerate(where) if _drives(axis, c)]
@@ -297,6 +301,29 @@ def changes(
         out[j] = (left + out[j]) * (gain / motor_gain(moved, logs)) - left
     if gain != 1.0:
         out /= gain
+    return out
+
+
+def _walked(
+    axis: AxisModel,
+    logs: Sequence[PreparedLog],
+    where: Sequence[ParameterReference],
+    steps: Array,
+    asked: NDArray[np.bool_] | None = None,
+    order: Literal["C", "F"] = "C",
+) -> Array:
+    """The changes (m, n) N of averaged forces along settled logs, the load of friction as it is."""
+    each = np.ones(sum(map(len, logs)), dtype=bool) if asked is None else asked
+    own = split_by_log(each, logs)
+    ends = np.cumsum([np.count_nonzero(some) for some in own])
+    spans = [slice(end - np.count_nonzero(some), end) for end, some in zip(ends, own, strict=True)]
+    out = np.empty((len(where), ends[-1]), order=order)
+
+    def walk(job: tuple[_Walk, tuple[PreparedLog, NDArray[np.bool_], slice]]) -> None:
+        (rows, along), (log, some, span) = job
+        out[rows, span] = along(log)[:, some]
+
+    spread(walk, product(_walks(axis, where, steps), zip(logs, own, spans, strict=True)))
     return out
 
 
@@ -310,24 +337,35 @@ def _by_load(
     logs: Sequence[PreparedLog],
     where: Sequence[ParameterReference],
     steps: Array,
+    walked: Array,
 ) -> Array:
-    """Change (m, n) N of the residual as parameters move the load of the friction."""
-    out, loading = np.zeros((len(where), sum(map(len, logs)))), _loading(axis)
+    """Change (m, n) N of the residual as parameters move the load of the friction.
+
+    walked: the changes (m, n) N under the load as it is. The load changes by so little while
+    bristles slip that a friction follows that of the moment, of which one walk tells.
+    """
+    out, loading = np.zeros_like(walked), _loading(axis)
     own = [j for j, c in enumerate(where) if _loads(loading, c.effect)]
     if not own:
         return out
-    moved = split_by_log(-changes(loading, logs, [where[j] for j in own], steps[own]).T, logs)
+    moved = -walked
+    # of a friction that it bears, the part that makes the load is without what the load makes
+    rubs = [j for j in own if where[j].effect and loading[where[j].effect].effect.kind in RUBBING]
+    if rubs:
+        moved[rubs] = -_walked(loading, logs, [where[j] for j in rubs], steps[rubs])
     rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
     table = _table_between(rubbing)
 
     def followed(job: tuple[PreparedLog, Array]) -> Array:
         log, means = job
-        motion = _driven(rubbing, log, axis)[0]
-        loads = motion.signals[2] + _sharpened(means.T, log)
-        forces = np.stack([total_force(table, _under(motion, load)) for load in loads])
-        return log.test_function.mean(forces - total_force(table, motion))
+        motion, by = _driven(rubbing, log, axis)[0], _sharpened(means.T, log)
+        load, now = motion.signals[2], total_force(table, motion)
+        step = STEP * (float(np.std(load)) or 1.0)
+        by *= (total_force(table, _under(motion, load + step)) - now) / step
+        return log.test_function.mean(by)
 
-    out[own] = np.concatenate(spread(followed, zip(logs, moved, strict=True)), axis=1)
+    each = zip(logs, split_by_log(moved[own].T, logs), strict=True)
+    out[own] = np.concatenate(spread(followed, each), axis=1)
     return out
 
 

@@ -18,7 +18,7 @@ from identify.dataset.preparation import is_told
 from identify.dataset.prepared_log import moving, sticks
 from identify.dataset.time_scale import AtLength
 from identify.estimation.alignment import fit_aligned, realigned
-from identify.estimation.fit import fit_axis
+from identify.estimation.fit import finished, fit_axis
 from identify.estimation.offered import fitted_count
 from identify.selection.acceptance import Judged, prefers
 from identify.selection.doubts import Conclusion, concluded
@@ -43,18 +43,33 @@ def at_another_length(
 
 
 def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> Iterator[Judged]:
-    """What was found at each length (s) at which it leaves a force that its own length hides."""
+    """What was found at each length (s) at which it leaves a force that its own length hides.
+
+    A longer test function leaves less of any force: what leaves more there is the averaging of the
+    model itself, as that of the load which a friction bears.
+    """
     own = _shown(found.final)
-    for length in lengths:
+    shorter = [own]
+    for length in sorted(lengths):
+        # A longer one averages out what hides a force here; a shorter one shows what is fast.
+        if length > own.length and found.steps and not found.final.at_floor:
+            continue
         if (dataset := _telling(length, found, catalogue)) is None:
             continue
-        there = Judged(fit_axis(found.final.fit.axis, dataset.training), dataset)
-        if there.at_floor:
-            continue
-        # A longer one averages out what hides a force here; a shorter one shows what is fast.
-        shows = found.final.at_floor if length > own.length else _shown(there).shows_more_than(own)
-        if shows or not found.steps:
+        there = _at_its_length(found, dataset)
+        shown = _shown(there)
+        is_force = all(shown.structure <= s.left for s in shorter if s.length < length)
+        shorter.append(shown)
+        shows = length > own.length or shown.shows_more_than(own)
+        if is_force and not there.at_floor and (shows or not found.steps):
             yield there
+
+
+def _at_its_length(found: Found, dataset: Dataset) -> Judged:
+    """What was found on a dataset of another length; fitted, unless it is at the floor without."""
+    fit = found.final.fit
+    there = Judged(finished(fit.axis, fit.begun, dataset.training, fit.outcome), dataset)
+    return there if there.at_floor else Judged(fit_axis(fit.axis, dataset.training), dataset)
 
 
 def _shown(judged: Judged) -> AtLength:

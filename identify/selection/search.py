@@ -269,7 +269,7 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
     """What was found, on the dataset of the final fit, whose channel delay is another.
 
     So that the error without anything is one number, beside every candidate and in the answer. What
-    was decided, and by which score, stays.
+    was decided, and by which score, stays; so does the part that those leave which are not taken.
     """
     dataset = final.dataset
 
@@ -280,7 +280,7 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
     first = there(found.base.fit)
 
     def candidate(one: Candidate) -> Candidate:
-        if one.is_noise or one.score is None:
+        if not one.supported or one.is_noise:
             left, error = np.sqrt(one.gain.left), first.other_error
             return replace(one, gain=replace(one.gain, before=error, after=left * error))
         by = candidate_of(first, there(one.fit), one.effect, ())
