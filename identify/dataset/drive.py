@@ -45,7 +45,7 @@ def actual_force(axis: AxisModel, motion: Motion) -> Array:
     return _behind_command(Valued.of(part), motion) if part.effects else motion.raw[1]
 
 
-@lru_cache(maxsize=8)  # while a fit moves other parameters, the actual force stays
+@lru_cache(maxsize=16)  # while a fit moves other parameters, the actual force stays
 def _behind_command(actuation: Valued, motion: Motion) -> Array:
     fine = motion.at_samples(0.5)
     return motion.raw[1] + _added(actuation.axis, motion, fine, motion.sample_period)

@@ -221,6 +221,11 @@ class Motion:
         momentum, force = self._block_means(np.stack([self.bodies.momentum, self.bodies.force]))
         return np.asarray(self.command - force - rate(momentum, self.period))
 
+    @cached_property
+    def net_scatter(self) -> float:
+        """By how much that changes, N RMS about its mean: a weight that is held counts nothing."""
+        return float(np.std(self.net))
+
     @property
     def joint_signals(self) -> Array:
         """The signals, and of a joint its load N and the speeds of all joints, (4 + n_axes, n)."""

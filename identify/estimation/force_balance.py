@@ -169,12 +169,13 @@ def settled(axis: AxisModel, logs: Sequence[PreparedLog]) -> list[PreparedLog]:
     hides = [log.motion.path.room if log.motion.path else 0.0 for log in logs]
     if not any(f.effect.remembers for f in axis.effects) or sticks(axis) or not any(hides):
         return list(logs)
-    own, force = Valued.of(axis), _held_over(axis, logs[int(np.argmax(hides))].motion, max(hides))
+    own = Valued.of(axis)
+    holds = Valued.of(replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers)))
+    force = _held_over(holds, logs[int(np.argmax(hides))].motion, max(hides))
 
     def one(log: PreparedLog) -> PreparedLog:
         motion = log.motion
-        # what changes: a weight that the motor holds says nothing of how fine its force is
-        matters = motion.slip is None and force > QUIET * float(np.std(motion.net))
+        matters = motion.slip is None and force > QUIET * motion.net_scatter
         return _settled(own, log) if matters else log
 
     return spread(one, logs)
@@ -199,12 +200,12 @@ def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
     return replace(log, motion=replace(motion, slip=slip))
 
 
-def _held_over(axis: AxisModel, motion: Motion, way: float) -> float:
+@lru_cache(maxsize=16)  # most of what a fit moves is none of theirs
+def _held_over(holds: Valued, motion: Motion, way: float) -> float:
     """Force (N) by which laws with memory change over so much of a way (m) from the start."""
-    own = replace(axis, effects=tuple(f for f in axis.effects if f.effect.remembers))
     moved = np.array([0.0, way, 0.0])
     place = np.full(len(moved), motion.position[0])
-    now, _, then = force_along(own, place, moved / motion.period, motion.period, *Kind)
+    now, _, then = force_along(holds.axis, place, moved / motion.period, motion.period, *Kind)
     return float(abs(then - now))
 
 

@@ -269,7 +269,7 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
     """What was found, on the dataset of the final fit, whose channel delay is another.
 
     So that the error without anything is one number, beside every candidate and in the answer. What
-    was decided, and by which score, stays; so does the part that those leave which are not taken.
+    was decided, and by which score, stays; so does the part that those leave which were not taken.
     """
     dataset = final.dataset
 
@@ -278,9 +278,10 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
         return one if fit.logs is dataset.training else refitted_on(fit.axis, one)
 
     first = there(found.base.fit)
+    taken = {id(s.tried.candidate) for s in (*found.steps, *found.passed)}
 
     def candidate(one: Candidate) -> Candidate:
-        if not one.supported or one.is_noise:
+        if one.is_noise or id(one) not in taken:
             left, error = np.sqrt(one.gain.left), first.other_error
             return replace(one, gain=replace(one.gain, before=error, after=left * error))
         by = candidate_of(first, there(one.fit), one.effect, ())

@@ -44,8 +44,9 @@ def _compared_again(step: Step, found: Found) -> Found:
     if axis is None:
         return _with_step(found, step, replace(step, tied=()), final)
     without, own = refitted_on(axis, final), replace(step.tried, judged=final)
-    rivals = _not_refuted(_rivals(step, found), own, without)
-    fitted = (_in_its_place(t, own, without, found) for t in rivals)
+    at_first, taken = _at_beginnings(own), {s.change.name for s in found.steps}
+    rivals = (t for t in _rivals(step, found) if t.change.name not in taken)
+    fitted = (_in_its_place(t, own, at_first, without) for t in rivals)
     tied = [t for t in fitted if t is not None]
     # Another shape of a law cannot lead, as it can imitate any that may be missing; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
@@ -64,19 +65,27 @@ def _compared_again(step: Step, found: Found) -> Found:
     return _less_replaced(step.change.name, led)
 
 
-def _not_refuted(rivals: list[Tried], own: Tried, without: Judged) -> list[Tried]:
-    """Those that the beginnings of long logs do not clearly refute in its place."""
-    if without.dataset.part is without.dataset:
-        return rivals
-    on_part = replace(without, dataset=without.dataset.part)
-    here = replace(own, judged=refitted_on(own.judged.fit.axis, on_part))
+def _at_beginnings(tried: Tried) -> Tried:
+    """The same as the beginnings of long logs have it; itself where the logs are short."""
+    judged = tried.judged
+    part = replace(judged, dataset=judged.dataset.part)
+    short = part.dataset is judged.dataset
+    return tried if short else replace(tried, judged=refitted_on(judged.fit.axis, part))
 
-    def may_be_level(rival: Tried) -> bool:
-        laws = [*_values_of(rival, own)] if isinstance(rival.change, Added) else []
-        there = (refitted_on(without.fit.axis.with_effect(law), on_part) for law in laws)
-        return not laws or any(is_tied(replace(rival, judged=one), here) for one in there)
 
-    return [rival for rival in rivals if may_be_level(rival)]
+def _begun(rival: Tried, own: Tried, at_first: Tried, without: Judged) -> Iterator[AxisModel]:
+    """Axes to fit a rival from in its place; of long logs those that their beginnings leave level.
+
+    at_first: what was found, as these beginnings have it.
+    """
+    for law in _values_of(rival, own):
+        axis = without.fit.axis.with_effect(law)
+        if at_first is own:
+            yield axis
+            continue
+        there = refitted_on(axis, replace(without, dataset=at_first.judged.dataset))
+        if is_tied(replace(rival, judged=there), at_first):
+            yield there.fit.axis
 
 
 def _rivals(step: Step, found: Found) -> list[Tried]:
@@ -105,17 +114,12 @@ def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:
     return replace(found, steps=steps, final=final)
 
 
-def _in_its_place(rival: Tried, own: Tried, without: Judged, found: Found) -> Tried | None:
+def _in_its_place(rival: Tried, own: Tried, at_first: Tried, without: Judged) -> Tried | None:
     """A rival fitted in the place of what was found; None where it is none."""
-    if rival.change.name in {s.change.name for s in found.steps}:
-        return None
     if not isinstance(rival.change, Added):
         return _curve(rival, own, without)
-    for law in _values_of(rival, own):
-        fitted = _level(without.fit.axis.with_effect(law), rival, own, without)
-        if fitted is not None:
-            return fitted
-    return None
+    axes = _begun(rival, own, at_first, without)
+    return next((t for axis in axes if (t := _level(axis, rival, own, without))), None)
 
 
 def _curve(rival: Tried, own: Tried, without: Judged) -> Tried | None:

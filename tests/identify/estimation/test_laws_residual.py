@@ -100,7 +100,9 @@ def test_the_jacobian_is_the_difference_of_the_residual_beside_every_sensing_eff
         others.append(PAYLOAD)
     axis = beside(drawn(one), *others)
     where = [c for c in free_parameters(axis) if c.effect == one.name][:3]
-    assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where)
+    # bristles are derived as if they followed a change of the load at once: half a per cent
+    loose = 5e-3 if one.name == "load_dependent_friction" else 2e-3
+    assert_derived(axis, [c for c in free_parameters(axis) if not c.effect] + where, loose)
 
 
 @pytest.mark.parametrize("one", ["cogging", "load_dependent_friction", "actuator_lag"])
