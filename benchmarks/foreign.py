@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import zlib
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -128,25 +128,43 @@ def added_on_logs(base: Machine, found: AxisDiagnosis, seed: int) -> float:
     return float(np.sqrt(max(found.base.error**2 - fit.error**2, 0.0)) / fit.floor)
 
 
+@dataclass(frozen=True)
+class Made:
+    """A machine with an effect of this size, that without, a model, and the seed of its logs."""
+
+    machine: Machine
+    base: Machine
+    model: MachineModel
+    size: float
+    code: int
+
+
+def made(name: str, wanted: float, seed: int, forms: Sequence[str] = ()) -> Made:
+    """A machine with an effect that adds so many noise floors of error; forms: of its own."""
+    planted = EFFECTS[name]
+    code = 1000 * seed + zlib.crc32(name.encode()) % 997
+    rng = np.random.default_rng(code)
+    base, model = reshaped(drawn(rng), forms, rng), model_for(planted)
+    machine, size = sized(planted, base, model, wanted, code)
+    return Made(machine, base, model, float(size), code)
+
+
 def planted_row(name: str, wanted: float, seed: int, forms: Sequence[str] = ()) -> Row:
     """A machine, diagnosed and judged; nothing is planted where the name is that.
 
     wanted: noise floors of error that the effect adds. Adds to a row: added, floors on the logs of
     the diagnosis; size, of the effect; seed; forms.
     """
-    planted = EFFECTS[name]
-    code = 1000 * seed + zlib.crc32(name.encode()) % 997
-    rng = np.random.default_rng(code)
-    base, model = reshaped(drawn(rng), forms, rng), model_for(planted)
-    machine, size = sized(planted, base, model, wanted, code)
+    planted, own = EFFECTS[name], made(name, wanted, seed, forms)
     begun = process_time()
-    found = diagnosed(model, machine, code)
+    found = diagnosed(own.model, own.machine, own.code)
     seconds = process_time() - begun
     shapes = tuple(FORMS[f] for f in forms)
     expected = Expected(planted.right, planted.near, known_shapes=shapes)
     return row_of(f"{name} @{wanted:g} {seed}", expected, found, seconds) | {
-        "added": added_on_logs(base, found, code), "wanted": wanted if planted.right else 0.0,
-        "size": float(size), "seed": seed, "forms": list(forms),
+        "added": added_on_logs(own.base, found, own.code),
+        "wanted": wanted if planted.right else 0.0,
+        "size": own.size, "seed": seed, "forms": list(forms),
     }  # fmt: skip
 
 

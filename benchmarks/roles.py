@@ -1,30 +1,35 @@
-"""Which of two logs chooses: `python -m benchmarks roles [--seed N] [-o FILE]`.
+"""Which of some logs chooses: `python -m benchmarks roles [--foreign] [--seed N] [-o FILE]`.
 
 The drives of ``drives``, each diagnosed twice with one model: with the one log to fit and the other
-to choose, and the other way round. Two answers are the same where each finding of the one is named,
-or told to be level, by one of the other. A finding that only one has may be told to depend on which
-log chooses: by the answer that has it, or by both; or the other may tell that its test log refuses
-it, which is why it is not there.
+to choose, and the other way round; and the machines of ``foreign``, of whose three logs each
+chooses once. Two answers are the same where each finding of the one is named, or told to be level,
+by one of the other. A finding that only one has may be told to depend on which log chooses: by the
+answer that has it, or by both; or the other may tell that its test log refuses it, which is why it
+is not there.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from itertools import combinations, permutations
 from pathlib import Path
 
 from benchmarks.drives import CATALOGUE, HIDDEN, jobs_of
 from benchmarks.figures import Figure, Target, report
-from benchmarks.judgement import NUMBER, Row
+from benchmarks.foreign import DURATION, FLOORS, FORMS, made
+from benchmarks.judgement import NUMBER, Row, fitted
 from benchmarks.second_simulator.drives import DRIVES, Recorder, log_of
+from benchmarks.second_simulator.effects import INSIDE
+from benchmarks.second_simulator.machine import logs_of
 from identify.analysis.first_model import first_model
-from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.selection.findings import Finding
 from identify.workflow import diagnose
 
-TITLE = "Which of two logs chooses"
+TITLE = "Which of some logs chooses"
 SEED = 64
 
 
@@ -47,36 +52,50 @@ def alone(here: AxisDiagnosis, there: AxisDiagnosis) -> set[str]:
     return {f.effect for f, family in named if not any(family & b for b in other)}
 
 
-def row(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
-    """One drive, its two logs in both orders."""
-    drive, (change, _) = DRIVES[name], HIDDEN[hidden]
-    plant = change(drive, recorder)
-    one, other, test = (log_of(drive, plant, recorder, 3 * seed + i) for i in range(3))
-    model = first_model({"one": one, "other": other}, name, CATALOGUE)
-    found = [
-        diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"]
-        for pair in ((one, other), (other, one))
-    ]
+def row(case: str, found: Sequence[AxisDiagnosis]) -> Row:
+    """The answers of one machine, of which another log chose each."""
     answers = [families(answer.findings) for answer in found]
     own = [{law.effect for law in answer.by_roles} for answer in found]
-    lone = [alone(*found), alone(*found[::-1])]
+    pairs = [*combinations(range(len(found)), 2)]
+    lone = {(i, j): alone(found[i], found[j]) for i, j in permutations(range(len(found)), 2)}
     return {
-        "case": f"{name} at {recorder.rate} Hz, {hidden}",
-        "same": same(*answers),
-        "told": all(effects <= says for effects, says in zip(lone, own, strict=True)),
-        "told by both": all(effects <= says for effects in lone for says in own),
+        "case": case,
+        "same": all(same(answers[i], answers[j]) for i, j in pairs),
+        "told": all(effects <= own[i] for (i, _), effects in lone.items()),
+        "told by both": all(effects <= own[i] & own[j] for (i, j), effects in lone.items()),
         "answers": [[sorted(family) for family in answer] for answer in answers],
         "by roles": [sorted(says) for says in own],
     }
 
 
-def rows(seed: int, out: Path | None = None) -> list[Row]:
-    """Of all drives; each is printed, and written to a file where one is given, as it ends."""
+def of_drive(name: str, hidden: str, recorder: Recorder, seed: int) -> Row:
+    """One drive, its two logs in both orders."""
+    drive, (change, _) = DRIVES[name], HIDDEN[hidden]
+    plant = change(drive, recorder)
+    one, other, test = (log_of(drive, plant, recorder, 3 * seed + i) for i in range(3))
+    model = first_model({"one": one, "other": other}, name, CATALOGUE)
+    pairs = (one, other), (other, one)
+    found = [diagnose(model, *pair, test, catalogue=CATALOGUE).axes["q"] for pair in pairs]
+    return row(f"{name} at {recorder.rate} Hz, {hidden}", found)
+
+
+def of_machine(name: str, seed: int) -> Row:
+    """One machine of the second simulator, bumps, cable and friction of forms of its own."""
+    own = made(name, FLOORS, seed, [*FORMS])
+    training, held_out = logs_of(own.machine, own.code, DURATION)
+    logs, found = {**training, **held_out}, []
+    for chosen in logs:
+        rest = {n: log for n, log in logs.items() if n != chosen}
+        dataset, base = fitted(own.model, "x", rest, {chosen: logs[chosen]})
+        found.append(diagnose_axis(base, dataset, CATALOGUE))
+    return row(f"{name} {seed}", found)
+
+
+def rows_of(jobs: Iterable[Callable[[], Row]], out: Path | None = None) -> list[Row]:
+    """Of all machines; each is printed, and written to a file where one is given, as it ends."""
     found = []
-    for job in jobs_of(seed).values():
-        assert isinstance(job, partial)
-        found.append(row(*job.args))
-        own = found[-1]
+    for job in jobs:
+        found.append(own := job())
         mark = "same" if own["same"] else "told" if own["told"] else "OTHER"
         print(f"{mark}: {own['case']}: {own['answers']}, {own['by roles']}", flush=True)
         if out:
@@ -85,9 +104,20 @@ def rows(seed: int, out: Path | None = None) -> list[Row]:
     return found
 
 
+def drives(seed: int) -> list[Callable[[], Row]]:
+    """The drives of a seed."""
+    jobs = (job for job in jobs_of(seed).values() if isinstance(job, partial))
+    return [partial(of_drive, *job.args) for job in jobs]
+
+
+def machines(seed: int) -> list[Callable[[], Row]]:
+    """The machines of the second simulator of a seed: nothing, and each effect of the catalogue."""
+    return [partial(of_machine, name, seed) for name in ("nothing", *INSIDE)]
+
+
 def measure() -> list[Figure]:
-    """On a seed that decided nothing."""
-    return figures(rows(SEED))
+    """On seeds that decided nothing."""
+    return figures(rows_of([*drives(SEED), *machines(SEED)]))
 
 
 def figures(found: Sequence[Row]) -> list[Figure]:
@@ -106,9 +136,11 @@ def figures(found: Sequence[Row]) -> list[Figure]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Judge all drives of a seed."""
+    """Judge all drives of a seed, or all machines of the second simulator."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks roles", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--foreign", action="store_true", help="those of the second simulator")
     parser.add_argument("-o", "--out", type=Path)
     given = parser.parse_args(arguments)
-    return report(figures(rows(given.seed, given.out)))
+    jobs = machines(given.seed) if given.foreign else drives(given.seed)
+    return report(figures(rows_of(jobs, given.out)))

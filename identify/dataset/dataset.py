@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.odd_log import Disagreement
-from identify.dataset.prepared_log import EVERYWHERE, PreparedLog
+from identify.dataset.prepared_log import EVERYWHERE, PreparedLog, within_reach
 from twin.effect import Excitation
 from twin.model.machine import AxisModel
 from twin.model.units import AxisUnits
@@ -20,6 +20,7 @@ from twin.model.units import AxisUnits
 Array = NDArray[np.float64]
 
 ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
+MOST_TURNS = 3  # of other logs that choose, each of which takes as long as a step of a search
 
 
 class Role(Enum):
@@ -116,15 +117,24 @@ class Dataset:
         return replace(moved, looks=self.looks + 1, asked=length)
 
     @property
-    def exchanged(self) -> Dataset | None:
-        """The same with training and selection logs exchanged; None without selection logs."""
+    def exchanged(self) -> tuple[Dataset, ...]:
+        """The same with other logs choosing in turn, and all others training; none where none does.
+
+        As many of the training logs as there are selection logs, or more where that took more turns
+        than are asked.
+        """
         if not self.selection:
-            return None
-        fit, held = (
-            tuple(w if w.reach == EVERYWHERE else replace(w, reach=EVERYWHERE) for w in logs)
-            for logs in (self.selection, self.training)
-        )
-        return replace(self, training=fit, selection=held)
+            return ()
+        turns = min(-(-len(self.training) // len(self.selection)), MOST_TURNS)
+        ends = [round(i * len(self.training) / turns) for i in range(turns + 1)]
+        return tuple(self._chosen_by(slice(*span)) for span in pairwise(ends))
+
+    def _chosen_by(self, span: slice) -> Dataset:
+        held = self.training[span]
+        rest = (w for w in self.training if w not in held)
+        fit = tuple(replace(w, reach=EVERYWHERE) for w in self.selection)
+        fit = (*rest, *fit)
+        return replace(self, training=fit, selection=within_reach(held, fit))
 
     def is_test(self, name: str) -> bool:
         """Whether the log of a name is a test log, which decides nothing."""

@@ -10,8 +10,6 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import islice
 
-import numpy as np
-
 from identify.dataset.bodies import Bodies, bodies_along
 from identify.dataset.coordinates import Covered
 from identify.dataset.dataset import Dataset, Role
@@ -26,7 +24,7 @@ from identify.dataset.given_logs import (
     telling_in,
 )
 from identify.dataset.motion import LONGEST_BLOCK, Motion, motion_of
-from identify.dataset.prepared_log import PreparedLog, independent, moving
+from identify.dataset.prepared_log import PreparedLog, independent, moving, within_reach
 from identify.dataset.readings import noise_of_most, ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS, require_test_function
 from identify.dataset.time_scale import beginnings, choose_length
@@ -37,7 +35,6 @@ from twin.parallel import spread
 from twin.telling import tell
 from twin.threads import trim_memory
 
-TURN = 2.0 * np.pi  # rad
 LONGER = "give a log in which it moves for longer at a time, or shorter test functions (s)"
 
 
@@ -123,11 +120,14 @@ def _of_axis(
         [m.after(begun[m.name]) if m.name in begun else m for m in some]
         for some in (fit, held, test)
     )
+    training, selection, others = (
+        tuple(spread(partial(PreparedLog.of, length=length), some)) for some in (fit, held, test)
+    )
     return Dataset(
         axis=name,
-        training=tuple(spread(partial(PreparedLog.of, length=length), fit)),
-        selection=_within_reach(held, length, fit),
-        test=_within_reach(test, length, fit),
+        training=training,
+        selection=within_reach(selection, training),
+        test=within_reach(others, training),
         covered=Covered(tuple(fit), axis.hardware.travel),
         begun=begun,
         asked=length,
@@ -152,28 +152,6 @@ def _begun(
         own = beginnings([*fit, *test])
         begun.update({name: end for name, end in own.items() if name in names})
     return begun
-
-
-def _within_reach(
-    motions: Sequence[Motion], length: float, fit: Sequence[Motion]
-) -> tuple[PreparedLog, ...]:
-    """Logs that test a fit, where its logs have been.
-
-    Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
-    where they have little in common with the training logs, and of a shaft that turned round in
-    these: after a whole turn it is at the same place again.
-    """
-    low, high = min(m.position.min() for m in fit), max(m.position.max() for m in fit)
-    if fit[0].units.rotary and high - low >= TURN:
-        return tuple(spread(partial(PreparedLog.of, length=length), motions))
-    # 0.05 of the range of the training logs, by which a log of another role may exceed it
-    margin = 0.05 * (high - low)
-    reach = (low - margin, high + margin)
-    within = spread(lambda m: PreparedLog.of(m, length, reach), motions)
-    # 0.2 of the logs of a role must lie within it
-    if sum(np.count_nonzero(w.reached) for w in within) < 0.2 * sum(map(len, within)):
-        return tuple(PreparedLog.of(m, length) for m in motions)
-    return tuple(within)
 
 
 def _long_enough(

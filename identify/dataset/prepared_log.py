@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 Reach = tuple[float, float]  # lowest and highest position, m
 EVERYWHERE: Reach = (-np.inf, np.inf)
+TURN = 2.0 * np.pi  # rad, after which a shaft is at the same place again
 
 # Logs -> forces (m, j) N of each, one column for each of j strengths.
 Columns: TypeAlias = Callable[[Sequence["PreparedLog"]], list[Array]]
@@ -104,6 +105,29 @@ class PreparedLog:
 
     def __len__(self) -> int:
         return len(self.command)
+
+
+def within_reach(
+    logs: Sequence[PreparedLog], fit: Sequence[PreparedLog]
+) -> tuple[PreparedLog, ...]:
+    """Logs that test a fit of others, where these have been.
+
+    Beyond, a force of position is extrapolated, and says nothing of what is there. All of them
+    where they have little in common with the others, and of a shaft that turned round in these:
+    after a whole turn it is at the same place again.
+    """
+    if not logs:
+        return ()
+    places = [log.motion.position for log in fit]
+    low, high = min(p.min() for p in places), max(p.max() for p in places)
+    if fit[0].motion.units.rotary and high - low >= TURN:
+        return tuple(logs)
+    # 0.05 of the range of the fit, by which a log of another role may exceed it
+    margin = 0.05 * (high - low)
+    within = tuple(replace(log, reach=(low - margin, high + margin)) for log in logs)
+    # 0.2 of the logs of a role must lie within it
+    enough = sum(np.count_nonzero(w.reached) for w in within) >= 0.2 * sum(map(len, within))
+    return within if enough else tuple(logs)
 
 
 def total_force(table: Table, motion: Motion) -> Array:

@@ -30,17 +30,42 @@ def effective_samples(residual: Array) -> float:
     "Practical Markov chain Monte Carlo", Stat. Sci. 7, 1992).
     """
     n = len(residual)
+    return float(max(n / samples_alike(colour_of(residual)), min(2.0, max(n, 1))))
+
+
+def samples_alike(colour: Array) -> float:
+    """How many samples of a residual tell as much as one: by its autocorrelations (m,)."""
+    return max(2.0 * float(colour.sum()) - 1.0, 1.0)
+
+
+def colour_of(residual: Array) -> Array:
+    """Autocorrelations (m,) of a residual (n,) N, 1 first, while pairs of them stay positive."""
+    n = len(residual)
     centred = residual - residual.mean() if n else residual
     if n < 4 or not centred.any():
-        return float(max(n, 1))
+        return np.ones(1)
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
     rho = np.fft.irfft(spectrum, size)[: n // 2]
     rho = rho / rho[0]
     pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
     stop = np.argmax(pairs <= 0.0) if (pairs <= 0.0).any() else len(pairs)
-    tau = max(2.0 * pairs[:stop].sum() - 1.0, 1.0)
-    return float(max(n / tau, 2.0))
+    return np.asarray(rho[: max(2 * stop, 1)])
+
+
+def taken_by_chance(columns: Array, penalty: Array, colour: Array) -> float:
+    """Part of the square of noise that columns (n, k) take on average, where nothing is to be had.
+
+    penalty (k, k): of what is smoothed. colour (m,): autocorrelations of the noise; of white noise
+    it is the part of effective parameters in the samples. tr((C'C + S)^-1 C'RC) / n, as the mean of
+    a quadratic form of noise of covariance R.
+    """
+    from scipy.signal import fftconvolve
+
+    kernel = np.concatenate([colour[:0:-1], colour])
+    spread = fftconvolve(columns, kernel[:, None], mode="same", axes=0)
+    gram = columns.T @ columns
+    return float(np.trace(solve(gram + penalty, columns.T @ spread))) / len(columns)
 
 
 @dataclass(frozen=True)

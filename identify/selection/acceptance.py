@@ -28,10 +28,17 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.estimation.evidence import blocks_of, effective_samples, left_out, rms
+from identify.estimation.evidence import (
+    blocks_of,
+    colour_of,
+    effective_samples,
+    left_out,
+    rms,
+    samples_alike,
+    taken_by_chance,
+)
 from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
-from identify.estimation.least_squares import solve
 from identify.rules import RULE
 
 Array = NDArray[np.float64]
@@ -170,11 +177,18 @@ class Judged:
     @cached_property
     def parameters(self) -> float:
         """Free parameters; of a free curve the effective ones, by how smooth it is."""
-        fit, where = self.fit, self.fit.scaling.where
+        return len(self.fit.residual) * self.by_chance(np.ones(1))
+
+    def by_chance(self, colour: Array) -> float:
+        """Part of the square of noise of a colour (m,) that its parameters take on average.
+
+        Of free curves as far as they are free to, at the frequencies at which they are passed.
+        """
+        fit = self.fit
         if not has_nonparametric(fit.axis):
-            return float(len(where))
-        gram, rows = fit.jacobian.T @ fit.jacobian, self._smoothing
-        return float(np.trace(solve(gram + rows.T @ rows, gram)))
+            return len(fit.scaling.where) * samples_alike(colour) / max(len(fit.residual), 1)
+        rows = self._smoothing
+        return taken_by_chance(fit.jacobian, rows.T @ rows, colour)
 
     @property
     def other_at_floor(self) -> bool:
@@ -204,8 +218,8 @@ def least_t(among: int) -> float:
 
 def score(before: Judged, after: Judged, control: float = 0.0, among: int = 1) -> Score:
     """What ``after`` takes of the error that ``before`` leaves; see Score."""
-    samples = effective_samples(after.fit.residual)
-    charge = max(after.parameters - before.parameters, 0.0) / samples
+    colour = colour_of(after.fit.residual)
+    charge = max(after.by_chance(colour) - before.by_chance(colour), 0.0)
     training = taken(before.training, after.training, before.fit.floor, charge)
     other = taken(before.other, after.other, before.other_floor)
     return Score(training, other, control, among)

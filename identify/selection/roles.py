@@ -1,9 +1,9 @@
 """What only the choice of the logs' roles decides.
 
-A law is fitted to the training logs and judged by the selection logs. Which of two like logs does
-which is the user's choice, and no property of the machine. So it is asked once more with the roles
-exchanged: of each law that was found whether it is still proved. What is proved only then, the
-search has noted at its end.
+A law is fitted to the training logs and judged by the selection logs. Which of like logs does which
+is the user's choice, and no property of the machine. So it is asked again with other logs choosing
+in turn: of each law that was found whether it is still proved. What is proved only then, the search
+has noted at its end.
 """
 
 from __future__ import annotations
@@ -36,11 +36,12 @@ def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDepen
 
     Of long logs their beginnings tell it.
     """
-    dataset = found.dataset.part.exchanged
-    if dataset is None or (found.final.at_floor and not findings):
+    turns = found.dataset.part.exchanged
+    if not turns or (found.final.at_floor and not findings):
         return ()
-    final = refitted_on(found.final.fit.axis, Judged(found.final.fit, dataset))
-    return (*_lost(found, findings, final), *_gained(found))
+    axis = found.final.fit.axis
+    finals = [refitted_on(axis, Judged(found.final.fit, dataset)) for dataset in turns]
+    return (*_lost(found, findings, finals), *_gained(found))
 
 
 def with_exchanged(
@@ -51,18 +52,24 @@ def with_exchanged(
     return tuple(replace(f, exchanged=lost.get(f.effect)) for f in findings)
 
 
-def _lost(found: Found, findings: Sequence[Finding], final: Judged) -> Iterator[RoleDependent]:
-    """Of the findings those that are not proved with the roles exchanged."""
+def _lost(
+    found: Found, findings: Sequence[Finding], finals: Sequence[Judged]
+) -> Iterator[RoleDependent]:
+    """Of the findings those that are not proved where other logs choose."""
     base = found.base.fit.axis
     for finding in findings:
         steps = [s for s in found.steps if s.change.name == finding.effect]
-        axis = final.fit.axis
-        for step in reversed(steps):
-            axis = step.change.undone(axis, base) or axis
-        there = score(refitted_on(axis, final), final)
-        if any(s.held or s.tried.candidate.is_noise for s in steps) or _proved(there):
+        if any(s.held or s.tried.candidate.is_noise for s in steps):
             continue
-        yield RoleDependent(finding.effect, True, there.part, there.t)
+        scores = []
+        for final in finals:
+            axis = final.fit.axis
+            for step in reversed(steps):
+                axis = step.change.undone(axis, base) or axis
+            scores.append(score(refitted_on(axis, final), final))
+        if refused := [s for s in scores if not _proved(s)]:
+            worst = min(refused, key=lambda s: s.t)
+            yield RoleDependent(finding.effect, True, worst.part, worst.t)
 
 
 def _gained(found: Found) -> Iterator[RoleDependent]:

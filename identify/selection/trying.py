@@ -122,27 +122,33 @@ def tried_beside(
 
 
 def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) -> list[Tried]:
-    """What is proved with training and selection logs exchanged, judged with the roles as they are.
+    """What is proved where other logs choose, judged with the roles as they are; each law once.
 
     Fitted again for that: what it takes is to be seen either way, but a start that the one group of
-    logs hides, the other may show. Whoever looks twice finds more by chance, so that each is one of
-    twice as many changes. Nothing is asked where a law was doubted at the end
-    of a search, as its kin would be one after another; nor of a joint beside its bodies, which all
-    of the logs chose.
+    logs hides, the other may show. Whoever looks more often finds more by chance, so that each is
+    one of as many times the changes. Nothing is asked where a law was doubted at the end of a
+    search, as its kin would be one after another; nor of a joint beside its bodies, which all of
+    the logs chose.
     """
     own = judged.dataset
-    dataset = None if own.beside_bodies or trial.barred or judged.at_floor else own.exchanged
-    if dataset is None:
+    if own.beside_bodies or trial.barred or judged.at_floor:
         return []
-    there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
-    tried = tried_beside(there, trial, within(progress, "training and selection logs exchanged"))[1]
+    turns = own.exchanged
 
     def as_they_are(t: Tried) -> Tried:
         score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
-        return judged_change(judged, t.screening, fit, 2 * score.among if score else 1)
+        among = (len(turns) + 1) * score.among if score else 1
+        return judged_change(judged, t.screening, fit, among)
 
-    found = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
-    return [as_they_are(t) for t in found if not t.candidate.is_noise]
+    found: dict[str, Tried] = {}
+    for dataset in turns:
+        there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
+        tried = tried_beside(there, trial, within(progress, "other logs choosing"))[1]
+        proved = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
+        for t in proved:
+            if not t.candidate.is_noise and t.change.name not in found:
+                found[t.change.name] = as_they_are(t)
+    return [*found.values()]
 
 
 def may_be_itself(c: Candidate) -> bool:

@@ -299,7 +299,7 @@ class RoleDependentEntry(Entry):
 
     effect: str
     named: bool
-    """Whether it is proved as the roles are; else it is with them exchanged."""
+    """Whether it is proved as the roles are; else it is where other logs choose."""
     part: Number
     t: Number
 

@@ -149,6 +149,6 @@ def left_in_words(found: AxisDiagnosis, floor: float) -> list[str]:
 def role_in_words(law: RoleDependent) -> str:
     """That a law is proved or not by which log chooses."""
     other = f"it takes {percent(max(law.part, 0.0))} of what is left, t = {law.t:.1f}"
-    proved = "with the training and the selection logs exchanged it is"
+    proved = "with other logs choosing it is"
     says = f"{proved} not proved: {other}" if law.named else f"as they are not ({other}), {proved}"
     return f"whether {law.effect} is proved depends on which log chooses: {says}"
