@@ -37,12 +37,36 @@ def without_odd_log(
             break
     else:
         ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
-    if odd and odd.is_of_recording and not odd.is_sure and _is_unexplained(ended):
-        # What all of them lack looks like some delay or gain of one.
-        return (conclude(base, dataset) if _spoiling(odd, dataset) else ended), None
-    if _spoiling(odd, dataset) is None and _is_unexplained(ended):
-        return _without_suspect(base, dataset, conclude) or (ended, odd)
-    return ended, odd
+    if not _is_unexplained(ended):
+        return ended, odd
+    if _spoiling(odd, dataset):
+        return _with_it(base, dataset, conclude, ended, odd)
+    if _may_be_all(odd):
+        return ended, None
+    return _without_suspect(base, dataset, conclude) or (ended, odd)
+
+
+def _may_be_all(odd: Disagreement | None) -> bool:
+    """Whether it may be no log's: what all of them lack looks like some delay or gain of one."""
+    return odd is not None and odd.is_of_recording and not odd.is_sure
+
+
+def _with_it(
+    base: Fit,
+    dataset: Dataset,
+    conclude: Callable[[Fit, Dataset], Conclusion],
+    ended: Conclusion,
+    odd: Disagreement | None,
+) -> tuple[Conclusion, Disagreement | None]:
+    """What all logs come to, where the others are not explained without an odd one.
+
+    That it is odd stands unless all together prove something, beside which it is not.
+    """
+    whole = conclude(base, dataset)
+    beside = _odd_beside(whole, dataset)
+    if whole.findings and _spoiling(beside, dataset) is None:
+        return whole, beside
+    return (whole, None) if _may_be_all(odd) else (ended, odd)
 
 
 def _spoiling(odd: Disagreement | None, dataset: Dataset) -> str | None:
