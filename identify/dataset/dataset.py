@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.odd_log import Disagreement
-from identify.dataset.prepared_log import EVERYWHERE, PreparedLog, within_reach
+from identify.dataset.prepared_log import EVERYWHERE, PreparedLog, moving, within_reach
 from twin.effect import Excitation
 from twin.model.machine import AxisModel
 from twin.model.units import AxisUnits
@@ -121,13 +121,15 @@ class Dataset:
         """The same with other logs choosing in turn, and all others training; none where none does.
 
         As many of the training logs as there are selection logs, or more where that took more turns
-        than are asked.
+        than are asked; those that tell something where the others have been.
         """
         if not self.selection:
             return ()
         turns = min(-(-len(self.training) // len(self.selection)), MOST_TURNS)
         ends = [round(i * len(self.training) / turns) for i in range(turns + 1)]
-        return tuple(self._chosen_by(slice(*span)) for span in pairwise(ends))
+        others = (self._chosen_by(slice(*span)) for span in pairwise(ends))
+        groups = ((d, (d.training, d.selection)) for d in others)
+        return tuple(d for d, each in groups if all(moving(w, sticks=True).any() for w in each))
 
     def _chosen_by(self, span: slice) -> Dataset:
         held = self.training[span]
