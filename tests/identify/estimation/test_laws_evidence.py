@@ -19,6 +19,7 @@ from identify.estimation.evidence import (
     left_out,
     noise_gain,
     students_t,
+    taken_by_chance,
 )
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import (
@@ -63,6 +64,24 @@ def test_effective_samples_of_little_are_its_number():
     assert effective_samples(np.full(50, 7.0)) == 50.0
     assert effective_samples(np.linspace(0.0, 1.0, 64)) >= 2.0
     assert effective_samples(np.array([1.0, 2.0, 5.0, 9.0])) < 4.0
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+@pytest.mark.parametrize("turns", [3.0, 150.0])
+def test_columns_take_of_noise_what_it_holds_where_they_are(pole, turns):
+    """Of slow noise a slow curve takes much, and a fast one next to nothing."""
+    phase = 2.0 * np.pi * turns * np.arange(1000) / 1000.0
+    columns = np.stack([f(k * phase) for f in (np.sin, np.cos) for k in (1.0, 1.1)], axis=1)
+    basis, share = np.linalg.qr(columns)[0], []
+    for seed in range(400):
+        noise = coloured(1000, pole, seed)
+        share.append(np.sum((basis.T @ noise) ** 2) / np.sum(noise**2))
+    colour = pole ** np.arange(1000.0)[: 1 if pole == 0.0 else 200]
+    told = taken_by_chance(columns, np.zeros((4, 4)), colour)
+    assert told == pytest.approx(np.mean(share), rel=0.15)
+    assert told == pytest.approx(0.004, rel=1e-6) if pole == 0.0 else (told > 0.01) == (turns < 10)
+    stiff = 1e9 * np.eye(4)
+    assert taken_by_chance(columns, stiff, colour) < 1e-3 * told
 
 
 def test_the_bic_is_that_of_its_definition():

@@ -43,3 +43,19 @@ def test_what_a_long_test_function_averages_away_is_found_by_a_short_one() -> No
     told = found(SHORT)
     assert told.named == ("cogging",)
     assert told.dataset.test_function_length == pytest.approx(SHORT)
+
+
+def test_what_a_longer_test_function_leaves_more_of_is_asked_of_no_force() -> None:
+    """The load that a friction bears is averaged too, and is told badly by long ones."""
+    loaded = having(SLIDE, "load_dependent_friction", motor=0.05)
+    logs = {f"run{i}": logged(loaded, Ride(40 + i, 8.0), noise=0.01) for i in range(3)}
+    *fit, held = logs.items()
+    model = MachineModel("m", {"x": SLIDE}, RATE)
+    dataset = datasets(model, dict(fit), dict([held]), SHORT)["x"]
+    base, asked = fit_axis(SLIDE, dataset.training), set[str]()
+    catalogue = few("load_dependent_friction", "spring", "cogging")
+    told = diagnose_axis(base, dataset, catalogue, lambda what, *_: asked.add(what), (LONG,))
+    assert told.named == ("load_dependent_friction",)
+    at_long = fit_axis(told.final.axis, told.dataset.at_length(LONG).training)
+    assert at_long.ratio > 3.0 > at_long.error / told.final.error
+    assert not any("200 ms" in what for what in asked)

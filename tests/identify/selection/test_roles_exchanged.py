@@ -7,6 +7,7 @@ import pytest
 from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 
 from benchmarks.drives import CATALOGUE, HIDDEN
+from benchmarks.roles import of_machine
 from benchmarks.second_simulator.drives import DRIVES, Recorder, log_of
 from identify import diagnose
 from identify.analysis.first_model import first_model
@@ -63,6 +64,34 @@ def test_what_one_log_does_not_propose_and_both_prove_is_named_whichever_log_cho
     two = {"two": logged(true, Ride(13, 6.0), sticky)}
     for pair in ((one, two), (two, one)):
         assert diagnose_axis(*begun(SLIDE, *pair), KNOWN).named == ("cogging",)
+
+
+def test_other_logs_choose_in_turn_where_the_others_have_been() -> None:
+    rides = {"near": Ride(1, reach=0.03), "far": Ride(2, reach=0.06), "too": Ride(3, reach=0.05)}
+    logs = {name: logged(SLIDE, ride) for name, ride in rides.items()}
+    held = {"held": logged(SLIDE, Ride(4, reach=0.02))}
+
+    def turns(names: list[str]) -> list[tuple[set[str], set[str]]]:
+        dataset = begun(SLIDE, {n: logs[n] for n in names}, held)[1]
+        both = ((d.training, d.selection) for d in dataset.exchanged)
+        return [({w.motion.name for w in a}, {w.motion.name for w in b}) for a, b in both]
+
+    assert turns(["near"]) == [({"held"}, {"near"})]
+    assert turns(["near", "far"]) == [({"far", "held"}, {"near"}), ({"near", "held"}, {"far"})]
+    assert len(turns(["near", "far", "too"])) == 3
+    (first, second) = begun(SLIDE, {n: logs[n] for n in ("near", "far")}, held)[1].exchanged
+    assert all(w.reached.all() for w in first.selection)
+    assert 0.2 < np.mean(second.selection[0].reached) < 0.9
+    assert begun(SLIDE, logs, {})[1].exchanged == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", ["nothing", "asymmetric_friction"])
+def test_three_logs_tell_the_same_whichever_of_them_chooses(hidden: str) -> None:
+    """One chose by itself; its answer was "unexplained", or lacked the shape of the bumps."""
+    found = of_machine(hidden, 54)
+    assert found["same"] or found["told"], found["answers"]
+    assert all(["cable_slab"] in answer for answer in found["answers"])
 
 
 @pytest.mark.slow
