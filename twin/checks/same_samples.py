@@ -112,9 +112,11 @@ class Pair:
     @property
     def is_another_motion(self) -> bool:
         """Whether positions part by more than a filter or noise does, which is told at once."""
-        apart = float(np.var(self.nearest.rest))
-        # a half and ten times, RMS
-        return apart > max(0.25 * float(np.var(self.short)), 100.0 * max(self.noise))
+        apart, most = float(np.var(self.nearest.rest)), 0.25 * float(np.var(self.short))
+        # a half, and ten times the noise, RMS; noise is in all that changes between samples
+        if apart <= most or apart > max(most, 50.0 * max(map(_changes, (self.long, self.short)))):
+            return apart > most
+        return apart > 100.0 * max(self.noise)
 
     @property
     def grid(self) -> float:
@@ -242,6 +244,11 @@ def noise_power(signal: Array, power: Power) -> float:
     rest, _ = rest_of(part[OWN:-OWN], beside(part))
     differing = (power(np.diff(part, k)) / comb(2 * k, k) for k in range(2, 7))
     return min(*differing, power(rest))
+
+
+def _changes(signal: Array) -> float:
+    """Power of what changes from sample to sample: twice that of white noise, and the motion's."""
+    return float(np.var(np.diff(signal)))
 
 
 def _beyond(signal: Array, step: float) -> float:
