@@ -20,7 +20,7 @@ from twin.model.units import AxisUnits
 Array = NDArray[np.float64]
 
 ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
-MOST_TURNS = 3  # of other logs that choose, each of which takes as long as a step of a search
+MOST_TURNS = 2  # of other logs that choose, each of which takes as long as a step of a search
 
 
 class Role(Enum):

@@ -78,7 +78,9 @@ def test_other_logs_choose_in_turn_where_the_others_have_been() -> None:
 
     assert turns(["near"]) == [({"held"}, {"near"})]
     assert turns(["near", "far"]) == [({"far", "held"}, {"near"}), ({"near", "held"}, {"far"})]
-    assert len(turns(["near", "far", "too"])) == 3
+    chosen = [names for _, names in turns(["near", "far", "too"])]
+    assert len(chosen) == 2
+    assert set.union(*chosen) == {"near", "far", "too"}
     (first, second) = begun(SLIDE, {n: logs[n] for n in ("near", "far")}, held)[1].exchanged
     assert all(w.reached.all() for w in first.selection)
     assert 0.2 < np.mean(second.selection[0].reached) < 0.9
