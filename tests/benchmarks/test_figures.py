@@ -36,12 +36,10 @@ def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
 
 # Tables of earlier versions, as RESULTS.md says of each, until `make bench` measures them again.
 OLDER = {
-    "Simulation", "Start of a process", "Fits against mujoco.sysid", "Diagnosis", "Self-test",
-    "Commands in passes", "The thesis reproduced", "Fuzz",
+    "Diagnosis", "Self-test",
     "Stages of a diagnosis in passes, and the effects that it tries",
     "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes",
     "Second simulator", "Real machines with a term withheld from their model",
-    "A model as feedforward",
 }  # fmt: skip
 
 
