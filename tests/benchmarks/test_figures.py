@@ -39,7 +39,7 @@ OLDER = {
     "Diagnosis", "Self-test",
     "Stages of a diagnosis in passes, and the effects that it tries",
     "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes",
-    "Second simulator", "Real machines with a term withheld from their model",
+    "Second simulator",
 }  # fmt: skip
 
 
