@@ -38,7 +38,6 @@ def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
 OLDER = {
     "Diagnosis", "Self-test",
     "Stages of a diagnosis in passes, and the effects that it tries",
-    "Diagnosis of fifteen kinds of hidden effect, bumps of another form, in passes",
     "Second simulator",
 }  # fmt: skip
 
