@@ -78,7 +78,7 @@ def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
     return _noises_of(axis, tuple(motions))
 
 
-@lru_cache(maxsize=16)  # a fit, its evidence and its comparison ask for the same
+@lru_cache(maxsize=4)  # a fit, its evidence and its comparison ask for the same
 def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...]:
     noises = [noise_of(axis, motion) for motion in motions]
     thinned = np.mean([noise.folded > 0.0 for noise in noises]) >= 0.5  # logs of one recorder

@@ -60,12 +60,13 @@ def taken_by_chance(columns: Array, penalty: Array, colour: Array) -> float:
     it is the part of effective parameters in the samples. tr((C'C + S)^-1 C'RC) / n, as the mean of
     a quadratic form of noise of covariance R.
     """
-    from scipy.signal import fftconvolve
+    from scipy.signal import oaconvolve
 
     kernel = np.concatenate([colour[:0:-1], colour])
-    spread = fftconvolve(columns, kernel[:, None], mode="same", axes=0)
+    # one at a time: columns of whole logs are most of the memory
+    spread = (columns.T @ oaconvolve(column, kernel, mode="same") for column in columns.T)
     gram = columns.T @ columns
-    return float(np.trace(solve(gram + penalty, columns.T @ spread))) / len(columns)
+    return float(np.trace(solve(gram + penalty, np.stack([*spread], axis=1)))) / len(columns)
 
 
 @dataclass(frozen=True)

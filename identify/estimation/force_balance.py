@@ -200,7 +200,7 @@ def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
     return replace(log, motion=replace(motion, slip=slip))
 
 
-@lru_cache(maxsize=16)  # most of what a fit moves is none of theirs
+@lru_cache(maxsize=4)  # most of what a fit moves is none of theirs
 def _held_over(holds: Valued, motion: Motion, way: float) -> float:
     """Force (N) by which laws with memory change over so much of a way (m) from the start."""
     moved = np.array([0.0, way, 0.0])

@@ -187,8 +187,11 @@ class Judged:
         fit = self.fit
         if not has_nonparametric(fit.axis):
             return len(fit.scaling.where) * samples_alike(colour) / max(len(fit.residual), 1)
-        rows = self._smoothing
-        return taken_by_chance(fit.jacobian, rows.T @ rows, colour)
+        rows, held = self._smoothing, "jacobian" in vars(fit)
+        taken = taken_by_chance(fit.jacobian, rows.T @ rows, colour)
+        if not held:  # it had been let go of
+            fit.forget()
+        return taken
 
     @property
     def other_at_floor(self) -> bool:
