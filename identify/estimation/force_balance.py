@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import product
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from identify.dataset.prepared_log import (
 )
 from identify.dataset.test_function import SHORTEST
 from identify.dataset.time_scale import QUIET
+from identify.estimation.force_along import force_along
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.settling import settle
@@ -286,13 +287,11 @@ def changes(
     kept: which test functions are asked for, of which the parameters then lie side by side.
     """
     logs = settled(axis, logs)
-    asked = np.ones(sum(map(len, logs)), dtype=bool) if kept is None else kept
+    every = np.ones(sum(map(len, logs)), dtype=bool)
+    asked = every if kept is None else kept
+    out = _walked(axis, logs, where, steps, every if _borne(axis) else asked)
     if _borne(axis):
-        out = _walked(axis, logs, where, steps)
-        out += _by_load(axis, logs, where, steps, out)
-        out = out[:, asked]
-    else:
-        out = _walked(axis, logs, where, steps, asked, order="C" if kept is None else "F")
+        out = (out + _by_load(axis, logs, where, steps, out))[:, asked]
     out *= np.concatenate([log.told for log in logs])[asked]
     gain = motor_gain(axis, logs)
     driving = [j for j, c in enumerate(where) if _drives(axis, c)]
@@ -310,15 +309,13 @@ def _walked(
     logs: Sequence[PreparedLog],
     where: Sequence[ParameterReference],
     steps: Array,
-    asked: NDArray[np.bool_] | None = None,
-    order: Literal["C", "F"] = "C",
+    asked: NDArray[np.bool_],
 ) -> Array:
     """The changes (m, n) N of averaged forces along settled logs, the load of friction as it is."""
-    each = np.ones(sum(map(len, logs)), dtype=bool) if asked is None else asked
-    own = split_by_log(each, logs)
+    own = split_by_log(asked, logs)
     ends = np.cumsum([np.count_nonzero(some) for some in own])
     spans = [slice(end - np.count_nonzero(some), end) for end, some in zip(ends, own, strict=True)]
-    out = np.empty((len(where), ends[-1]), order=order)
+    out = np.empty((len(where), ends[-1]), order="C" if asked.all() else "F")
 
     def walk(job: tuple[_Walk, tuple[PreparedLog, NDArray[np.bool_], slice]]) -> None:
         (rows, along), (log, some, span) = job
@@ -353,7 +350,8 @@ def _by_load(
     # of a friction that it bears, the part that makes the load is without what the load makes
     rubs = [j for j in own if where[j].effect and loading[where[j].effect].effect.kind in RUBBING]
     if rubs:
-        moved[rubs] = -_walked(loading, logs, [where[j] for j in rubs], steps[rubs])
+        every = np.ones(walked.shape[1], dtype=bool)
+        moved[rubs] = -_walked(loading, logs, [where[j] for j in rubs], steps[rubs], every)
     rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
     table = _table_between(rubbing)
 
@@ -501,39 +499,3 @@ def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
     # 1e-3 of what is usual, by which a smaller value is stepped as if it were that large
     size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), 1e-3 * usual))
     return size if value + size <= p.upper else -size
-
-
-def force_along(
-    axis: AxisModel, position: Array, velocity: Array, period: float, *kinds: Kind
-) -> Array:
-    """Force (n,) N of the axis' effects of these kinds, under no command.
-
-    position m and velocity m/s (n,) at the middle of samples that are ``period`` s long.
-    """
-    signals = np.stack([position, velocity, np.zeros_like(velocity)])
-    motion = Motion(
-        name="", axis="", track=Blocks(signals, signals[1:]), others=np.zeros_like(signals),
-        period=period, start=0.0, sample_period=period, position_noise=0.0,
-    )  # fmt: skip
-    return total_force(axis_table({"": parts_of(axis, *kinds)}), motion)
-
-
-def steady_friction(axis: AxisModel, place: float, velocity: float) -> float:
-    """Friction (N, positive where it opposes the motion) after a long way at one place.
-
-    place: m; velocity: m/s, not zero.
-    """
-    rubbing = tuple(f for f in axis.effects if f.effect.kind in RUBBING)
-    return float(-np.sign(velocity) * steady_force(replace(axis, effects=rubbing), place, velocity))
-
-
-def steady_force(
-    axis: AxisModel, place: float, velocity: float, way: float = 0.1, steps: int = 2000
-) -> float:
-    """Force (N) of an axis' forces and friction after a long way at one place.
-
-    place: m; velocity: m/s, not zero. way: m over which a law settles, in so many steps.
-    """
-    period = way / steps / abs(velocity)
-    places, velocities = np.repeat([[place], [velocity]], steps, axis=1)
-    return float(force_along(axis, places, velocities, period, Kind.FORCE, *RUBBING)[-1])

@@ -17,7 +17,8 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.prepared_log import moving
 from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.fit import Fit
-from identify.estimation.force_balance import averaged_force, steady_force
+from identify.estimation.force_along import steady_force
+from identify.estimation.force_balance import averaged_force
 from identify.estimation.free_curves import Shape, sticking
 from identify.estimation.intervals import BEYOND, with_band
 from identify.estimation.least_squares import solve

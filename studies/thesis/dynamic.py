@@ -22,7 +22,7 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished, fit_axis
-from identify.estimation.force_balance import force_along
+from identify.estimation.force_along import force_along
 from identify.estimation.intervals import half_widths
 from identify.estimation.open_loop import Beginning, OpenLoopRun, measured_beginning
 from studies.curves.dynamic_friction import dynamic_part_free, fit_dynamic_part

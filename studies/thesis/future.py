@@ -22,7 +22,7 @@ from identify.dataset.preparation import datasets
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import evidence, rms
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.force_balance import steady_friction
+from identify.estimation.force_along import steady_friction
 from identify.estimation.intervals import half_widths
 from identify.output.numbers import spaced
 from identify.selection.nonparametric import fit_nonparametric

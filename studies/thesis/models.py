@@ -22,7 +22,7 @@ from identify.dataset.preparation import datasets
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.force_balance import force_along
+from identify.estimation.force_along import force_along
 from identify.output.numbers import spaced
 from identify.output.report.page import Block
 from studies.drawing import BLUE

@@ -20,7 +20,7 @@ import numpy as np
 from identify.dataset.motion import motion_of
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import Fit, fit_axis
-from identify.estimation.force_balance import steady_friction
+from identify.estimation.force_along import steady_friction
 from identify.estimation.intervals import with_band
 from studies.curves.friction_curve import NAMES, fit_stribeck, stribeck_through
 from studies.curves.velocity_map import VelocityMap

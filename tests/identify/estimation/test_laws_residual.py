@@ -26,13 +26,12 @@ from identify.dataset.blocks import Blocks
 from identify.dataset.motion import motion_of
 from identify.dataset.prepared_log import REST_SPEED, PreparedLog, moving, scale_of, sticks
 from identify.dataset.test_function import TestFunction
+from identify.estimation.force_along import force_along, steady_friction
 from identify.estimation.force_balance import (
     averaged_force,
     difference_step,
-    force_along,
     jacobian,
     residual,
-    steady_friction,
 )
 from twin.effect import Kind
 from twin.laws.trials import legal

@@ -9,7 +9,7 @@ import pytest
 from built_fits import HARDWARE, axis_of, fitted
 from machines import CATALOGUE
 
-from identify.estimation.force_balance import force_along
+from identify.estimation.force_along import force_along
 from studies.curves.friction_curve import StribeckCurve
 from studies.curves.velocity_map import VelocityMap
 from studies.thesis import (
