@@ -339,8 +339,7 @@ def _by_load(
 ) -> Array:
     """Change (m, n) N of the residual as parameters move the load of the friction.
 
-    walked: the changes (m, n) N under the load as it is. The load changes by so little while
-    bristles slip that a friction follows that of the moment, of which one walk tells.
+    walked: N under the load as it is (m, n), which hardly changes while bristles slip.
     """
     out, loading = np.zeros_like(walked), _loading(axis)
     own = [j for j, c in enumerate(where) if _loads(loading, c.effect)]
