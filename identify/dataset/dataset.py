@@ -20,7 +20,7 @@ from twin.model.units import AxisUnits
 Array = NDArray[np.float64]
 
 ENOUGH = 30.0  # s of motion in each role, in which a search is made before all of it is fitted
-MOST_TURNS = 2  # of other logs that choose, each of which takes as long as a step of a search
+MOST_EXCHANGES = 2  # of other logs that choose, each of which takes as long as a step of a search
 
 
 class Role(Enum):
@@ -125,18 +125,17 @@ class Dataset:
         """
         if not self.selection:
             return ()
-        turns = min(-(-len(self.training) // len(self.selection)), MOST_TURNS)
+        turns = min(-(-len(self.training) // len(self.selection)), MOST_EXCHANGES)
         ends = [round(i * len(self.training) / turns) for i in range(turns + 1)]
-        others = (self._chosen_by(slice(*span)) for span in pairwise(ends))
-        groups = ((d, (d.training, d.selection)) for d in others)
-        return tuple(d for d, each in groups if all(moving(w, sticks=True).any() for w in each))
+        others = [self._chosen_by(*span) for span in pairwise(ends)]
+        roles = (Role.TRAINING, Role.SELECTION)
+        return tuple(d for d in others if all(moving(d.having(r), True).any() for r in roles))
 
-    def _chosen_by(self, span: slice) -> Dataset:
-        held = self.training[span]
-        rest = (w for w in self.training if w not in held)
-        fit = tuple(replace(w, reach=EVERYWHERE) for w in self.selection)
-        fit = (*rest, *fit)
-        return replace(self, training=fit, selection=within_reach(held, fit))
+    def _chosen_by(self, first: int, end: int) -> Dataset:
+        """The same with these training logs in the place of the selection logs, which train."""
+        own = (replace(w, reach=EVERYWHERE) for w in self.selection)
+        fit = (*self.training[:first], *self.training[end:], *own)
+        return replace(self, training=fit, selection=within_reach(self.training[first:end], fit))
 
     def is_test(self, name: str) -> bool:
         """Whether the log of a name is a test log, which decides nothing."""

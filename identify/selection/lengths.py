@@ -13,8 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import is_told
 from identify.dataset.prepared_log import moving, sticks
@@ -51,7 +49,7 @@ def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> It
     model itself, as that of the load which a friction bears.
     """
     own = _shown(found.final)
-    most = [(own.length, _most(found.final))]
+    most = [_at_most(found.final)]
     for length in sorted(lengths):
         # A longer one averages out what hides a force here; a shorter one shows what is fast.
         if length > own.length and found.steps and not found.final.at_floor:
@@ -60,8 +58,8 @@ def _showing(found: Found, lengths: Sequence[float], catalogue: Catalogue) -> It
             continue
         there = _at_its_length(found, dataset)
         shown = _shown(there)
-        is_force = all(shown.structure <= force for at, force in most if at < length)
-        most.append((length, _most(there)))
+        is_force = all(shown.structure <= m.structure for m in most if m.length < length)
+        most.append(_at_most(there))
         shows = length > own.length or shown.shows_more_than(own)
         if is_force and not there.at_floor and (shows or not found.steps):
             yield there
@@ -79,9 +77,9 @@ def _shown(judged: Judged) -> AtLength:
     return AtLength(judged.dataset.test_function_length, fit.error, fit.floor)
 
 
-def _most(judged: Judged) -> float:
-    """N RMS that a force may be at most of what a fit leaves beside the noise that is sure."""
-    return float(np.sqrt(max(judged.fit.error**2 - judged.fit.noise.low**2, 0.0)))
+def _at_most(judged: Judged) -> AtLength:
+    """The same, with no more of it taken for noise than is sure."""
+    return replace(_shown(judged), floor=judged.fit.noise.low)
 
 
 def _telling(length: float, found: Found, catalogue: Catalogue) -> Dataset | None:

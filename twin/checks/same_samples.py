@@ -114,9 +114,10 @@ class Pair:
         """Whether positions part by more than a filter or noise does, which is told at once."""
         apart, most = float(np.var(self.nearest.rest)), 0.25 * float(np.var(self.short))
         # a half, and ten times the noise, RMS; noise is in all that changes between samples
-        if apart <= most or apart > max(most, 50.0 * max(map(_changes, (self.long, self.short)))):
-            return apart > most
-        return apart > 100.0 * max(self.noise)
+        if apart <= most:
+            return False
+        sure = apart > 50.0 * max(_changes(self.long), _changes(self.short))
+        return sure or apart > 100.0 * max(self.noise)
 
     @property
     def grid(self) -> float:
