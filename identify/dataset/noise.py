@@ -80,7 +80,8 @@ def noises_of(axis: AxisModel, motions: Sequence[Motion]) -> tuple[Noise, ...]:
 
 @lru_cache(maxsize=4)  # a fit, its evidence and its comparison ask for the same
 def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...]:
-    noises = [noise_of(axis, motion) for motion in motions]
+    fastest = max((float(motion.raw[0].max()) for motion in motions), default=0.0)
+    noises = [noise_of(axis, motion, fastest) for motion in motions]
     thinned = np.mean([noise.folded > 0.0 for noise in noises]) >= 0.5  # logs of one recorder
     out = []
     for own, motion in zip(noises, motions, strict=True):
@@ -92,8 +93,11 @@ def _noises_of(axis: AxisModel, motions: tuple[Motion, ...]) -> tuple[Noise, ...
     return tuple(out)
 
 
-def noise_of(axis: AxisModel, motion: Motion) -> Noise:
-    """The measurement noise of one log, from its raw residual."""
+def noise_of(axis: AxisModel, motion: Motion, fastest: float | None = None) -> Noise:
+    """The measurement noise of one log, from its raw residual.
+
+    fastest: m/s, of all logs of the axis where there are others.
+    """
     axis, dt = axis.weighed, motion.sample_period
     raw = _raw_residual(axis, motion)
     # The median over segments ignores those with spikes and reversals, and what may stick: static
@@ -104,7 +108,9 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     segment = min(max(round(0.25 / dt), 256), len(raw))
     frequency, power = median_spectrum(raw, segment, dt, rests)
     half = np.cos(np.pi * frequency * dt) ** 2
-    gain = (rate_gain(frequency, dt) * axis.mass) ** 2 * _hung_gain(axis, motion, frequency)
+    hung, speed = parts_of(axis, Kind.STRUCTURE), fastest or float(motion.raw[0].max())
+    borne = _hung_gain(hung, dt, len(frequency), speed) if hung.effects else 1.0
+    gain = (rate_gain(frequency, dt) * axis.mass) ** 2 * borne
     bend = np.asarray(gain * part_left(motion.velocity_weight, frequency, dt))
     first, beside, top = BAND
     top = HALF if motion.velocity_weight else top
@@ -127,19 +133,17 @@ def noise_of(axis: AxisModel, motion: Motion) -> Noise:
     return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
 
 
-def _hung_gain(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
-    """Power (k,) of the force that an acceleration of the axis takes, over that of its mass alone.
+@lru_cache(maxsize=16)
+def _hung_gain(hung: AxisModel, period: float, lines: int, speed: float) -> Array:
+    """Power (lines,) of the force that an acceleration of the axis takes, over that of its mass.
 
-    At these frequencies (k,) Hz. What hangs on the axis, or what this stands on, answers the noise
-    of the readings as it does the motion: at its resonance with many times the force. By the answer
-    to a jump of the velocity to the highest of the motion, at which a play is crossed.
+    At the frequencies of a transform of samples of ``period`` s. What hangs on the axis, or what
+    this stands on, answers the noise of the readings as it does the motion: at its resonance with
+    many times the force. By the answer to a jump to ``speed`` m/s, at which a play is crossed.
     """
-    hung = parts_of(axis, Kind.STRUCTURE)
-    if not hung.effects:
-        return np.ones_like(frequency)
     fine, long = 4, 16  # steps a sample; lines of a spectrum for each of these
-    period = motion.sample_period / fine
-    velocity = np.full(2 * (len(frequency) - 1) * fine * long, motion.raw[0].max() or 1.0)
+    period = period / fine
+    velocity = np.full(2 * (lines - 1) * fine * long, speed or 1.0)
     velocity[: fine * long] = 0.0
     table = on_blocks(hung)
     along = np.stack([np.cumsum(velocity) * period, velocity, np.zeros_like(velocity)])
@@ -148,12 +152,12 @@ def _hung_gain(axis: AxisModel, motion: Motion, frequency: Array) -> Array:
         table.entries, first, last, table.parameters[None], table.n_states, along,
         np.zeros_like(along), period, 0, force, table.masses[0], 0.0, table.remembers, velocity,
     )  # fmt: skip
-    alone = np.fft.rfft(axis.mass * rate(velocity, period))
+    alone = np.fft.rfft(hung.mass * rate(velocity, period))
     taken = alone - np.fft.rfft(force[0])
-    lines = slice(0, (len(frequency) - 1) * long + 1)
-    power = np.abs(taken[lines]) ** 2 / np.maximum(np.abs(alone[lines]) ** 2, 1e-300)
+    own = slice(0, (lines - 1) * long + 1)
+    power = np.abs(taken[own]) ** 2 / np.maximum(np.abs(alone[own]) ** 2, 1e-300)
     means = np.add.reduceat(power[long // 2 :], np.arange(0, len(power) - long // 2, long)) / long
-    return np.concatenate([power[:1], means])[: len(frequency)]
+    return np.concatenate([power[:1], means])[:lines]
 
 
 def _rounding_of(signal: Array, period: float) -> float:

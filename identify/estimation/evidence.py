@@ -9,11 +9,12 @@ from statistics import NormalDist
 
 import numpy as np
 
-from identify.estimation.least_squares import RIDGE, solve
+from identify.estimation.least_squares import RIDGE, ROUNDING, solve
 from twin.signals import Array
 
 BLOCKS = 24  # of time, for a standard error: many for Student's t, each longer than the memory
 SURE = 3.0  # standard errors from which a value is the data's: of noise one in 700 is as far off
+TOGETHER = 16  # columns of whole logs at once: they are most of the memory
 BETTER = 0.99  # of an error, from which another one is hardly better
 
 
@@ -44,7 +45,7 @@ def colour_of(residual: Array) -> Array:
     centred = residual - residual.mean() if n else residual
     if n < 4 or not centred.any():
         return np.ones(1)
-    size = 1 << (2 * n - 1).bit_length()
+    size = _padded(n)
     spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
     rho = np.fft.irfft(spectrum, size)[: n // 2]
     rho = rho / rho[0]
@@ -53,20 +54,36 @@ def colour_of(residual: Array) -> Array:
     return np.asarray(rho[: max(2 * stop, 1)])
 
 
-def taken_by_chance(columns: Array, penalty: Array, colour: Array) -> float:
-    """Part of the square of noise that columns (n, k) take on average, where nothing is to be had.
+def _padded(count: int) -> int:
+    """Samples of a fast transform in which so many do not meet themselves."""
+    return 1 << (2 * count - 1).bit_length()
 
-    penalty (k, k): of what is smoothed. colour (m,): autocorrelations of the noise; of white noise
-    it is the part of effective parameters in the samples. tr((C'C + S)^-1 C'RC) / n, as the mean of
-    a quadratic form of noise of covariance R.
+
+def taken_by_lag(columns: Array, penalty: Array) -> Array:
+    """Part of the square of noise that columns (n, k) take, by the lag (n,) of what they take.
+
+    penalty (k, k): of what is smoothed. For lag j tr((C'C + S)^-1 C' D_j C) / n, D_j a shift by j
+    samples; see ``by_chance``.
     """
-    from scipy.signal import oaconvolve
+    count, gram = len(columns), columns.T @ columns
+    size = np.sqrt(np.where(np.diag(gram) > 0.0, np.diag(gram), 1.0))
+    scaled = (gram + penalty) / np.outer(size, size) + ROUNDING * np.eye(len(size))
+    apart = np.linalg.inv(np.linalg.cholesky(scaled)).T / size[:, None]
+    padded, power = _padded(count), 0.0
+    for some in range(0, len(size), TOGETHER):
+        independent = columns @ apart[:, some : some + TOGETHER]
+        power = power + np.sum(np.abs(np.fft.rfft(independent.T, padded)) ** 2, axis=0)
+    return np.asarray(np.fft.irfft(power, padded)[:count]) / count
 
-    kernel = np.concatenate([colour[:0:-1], colour])
-    # one at a time: columns of whole logs are most of the memory
-    spread = (columns.T @ oaconvolve(column, kernel, mode="same") for column in columns.T)
-    gram = columns.T @ columns
-    return float(np.trace(solve(gram + penalty, np.stack([*spread], axis=1)))) / len(columns)
+
+def by_chance(by_lag: Array, colour: Array) -> float:
+    """Part of the square of noise that is taken on average, where nothing is to be had.
+
+    by_lag (n,): as ``taken_by_lag`` has it. colour (m,): autocorrelations of the noise, m at most
+    n; of white noise it is the part of effective parameters in the samples. The mean of a quadratic
+    form of noise of covariance R: tr((C'C + S)^-1 C'RC) / n.
+    """
+    return float(2.0 * colour @ by_lag[: len(colour)] - by_lag[0])
 
 
 @dataclass(frozen=True)

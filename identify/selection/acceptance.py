@@ -30,12 +30,13 @@ from identify.dataset.noise_floor import NoiseFloor, noise_beside
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.estimation.evidence import (
     blocks_of,
+    by_chance,
     colour_of,
     effective_samples,
     left_out,
     rms,
     samples_alike,
-    taken_by_chance,
+    taken_by_lag,
 )
 from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
@@ -185,13 +186,14 @@ class Judged:
         Of free curves as far as they are free to, at the frequencies at which they are passed.
         """
         fit = self.fit
-        if not has_nonparametric(fit.axis):
-            return len(fit.scaling.where) * samples_alike(colour) / max(len(fit.residual), 1)
-        rows, held = self._smoothing, "jacobian" in vars(fit)
-        taken = taken_by_chance(fit.jacobian, rows.T @ rows, colour)
-        if not held:  # it had been let go of
-            fit.forget()
-        return taken
+        if has_nonparametric(fit.axis):
+            return by_chance(self._taken, colour)
+        return len(fit.scaling.where) * samples_alike(colour) / max(len(fit.residual), 1)
+
+    @cached_property
+    def _taken(self) -> Array:
+        rows = self._smoothing
+        return taken_by_lag(self.fit.jacobian, rows.T @ rows)
 
     @property
     def other_at_floor(self) -> bool:

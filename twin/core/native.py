@@ -140,14 +140,16 @@ def along(entries, first, last, p, s, io, velocity, k, standing, steps, rows):
         answered = answers(entries, first, last, p, s, io)
     else:
         io[DT] = block / steps
+    part = 1.0 / steps
+    level = now + bend * (part * part - 1.0) / 12.0
     for j in range(steps):
-        at = (j + 0.5) / steps - 0.5
-        measured = now + rise * at + bend * (at * at + (1.0 / steps**2 - 1.0) / 12.0)
+        at = (j + 0.5) * part - 0.5
+        measured = level + at * (rise + bend * at)
         net, ridden = 0.0, measured
         if standing:
             net, ridden = shared(answered, io[MOVED], measured)
         for i in range(first, last):
-            rows[0, i] += answer(entries, i, p, s, io, net, ridden) / steps
+            rows[0, i] += answer(entries, i, p, s, io, net, ridden) * part
     io[DT] = block
 
 

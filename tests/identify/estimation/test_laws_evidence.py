@@ -13,13 +13,14 @@ from scipy.stats import norm
 
 from identify.estimation.evidence import (
     BLOCKS,
+    by_chance,
     effective_samples,
     evidence,
     held_out_gain,
     left_out,
     noise_gain,
     students_t,
-    taken_by_chance,
+    taken_by_lag,
 )
 from identify.estimation.force_balance import residual
 from identify.estimation.intervals import (
@@ -77,11 +78,11 @@ def test_columns_take_of_noise_what_it_holds_where_they_are(pole, turns):
         noise = coloured(1000, pole, seed)
         share.append(np.sum((basis.T @ noise) ** 2) / np.sum(noise**2))
     colour = pole ** np.arange(1000.0)[: 1 if pole == 0.0 else 200]
-    told = taken_by_chance(columns, np.zeros((4, 4)), colour)
+    told = by_chance(taken_by_lag(columns, np.zeros((4, 4))), colour)
     assert told == pytest.approx(np.mean(share), rel=0.15)
     assert told == pytest.approx(0.004, rel=1e-6) if pole == 0.0 else (told > 0.01) == (turns < 10)
     stiff = 1e9 * np.eye(4)
-    assert taken_by_chance(columns, stiff, colour) < 1e-3 * told
+    assert by_chance(taken_by_lag(columns, stiff), colour) < 1e-3 * told
 
 
 def test_the_bic_is_that_of_its_definition():
