@@ -37,7 +37,7 @@ def assert_agree(fit_a: Fitted, fit_b: Fitted, *, catalogue: Catalogue | None = 
     known = load_catalogue() if catalogue is None else catalogue
     a, b = (load_model(f, known) if isinstance(f, str | Path) else f for f in (fit_a, fit_b))
     found = agree(a, b, catalogue=known)
-    if not found.agrees:
+    if not found.agree:
         raise AssertionError(agree_text(found))
 
 

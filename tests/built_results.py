@@ -270,18 +270,18 @@ def simulation_fit(outcome=Outcome.CONVERGED, held=(6.1e-3, 4.3e-3)) -> Simulati
 
 def differences(*ratios: float) -> AxisAgreement:
     """Parameters p0, p1, ... that differ by so many joint standard errors."""
-    shown = [
-        Difference(f"p{i}", 2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
+    shown = {
+        f"p{i}": Difference(2.0 + i, 2.0 + i + ratio * (0.1 + 0.01 * i), 0.1 + 0.01 * i, unit, 3.1)
         for i, (ratio, unit) in enumerate(zip(ratios, ("kg", "N", "N s/m"), strict=False))
-    ]
+    }
     cause = Cause("payload_mass", 0.93)
     return AxisAgreement(shown, (), (), (), (1.02, 1.07), "N", 0.0139, (cause,))
 
 
 SAME = differences(0.7, -1.9, 2.3)
 OTHER = replace(
-    differences(11.0, -1.3, -4.7), only_a=("wear",), only_b=("gms", "cogging"),
-    not_compared=("p7",), above_floor=(7.3, 1.9),
+    differences(11.0, -1.3, -4.7), only_in_a=("wear",), only_in_b=("gms", "cogging"),
+    not_compared=("p7",), error_over_noise_floor=(7.3, 1.9),
     causes=(Cause("payload_mass", 0.61, ("constant_force",)), Cause("wear", 0.23)),
 )  # fmt: skip
 

@@ -22,7 +22,7 @@ ROOMS = (
     "fleet", "view", "testing", "demo", "app", "cli", "start",
 )  # fmt: skip
 TWIN_ROOMS = (
-    "errors", "files", "entries", "numbers", "signals", "telling", "threads", "parallel",
+    "errors", "files", "entries", "numbers", "signals", "record", "telling", "threads", "parallel",
     "isolated", "installed", "engine", "excitation", "curve", "knee", "effect", "law_parts", "core",
     "effects", "mujoco", "model", "logs", "checks", "importers", "laws", "feedforward",
     "experiments", "simulation", "export", "schemas", "examples",

@@ -334,7 +334,7 @@ def agree(
     with progress_on_stderr() as progress:
         progress("comparing the fits", 0, 1)
         result = workflow.agree(first, second, catalogue=catalogue)
-    return said_of(result, fine=result.agrees, a=a, b=b)
+    return said_of(result, fine=result.agree, a=a, b=b)
 
 
 def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Path]) -> Said:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def load(path: Path | str) -> Answer:
     written. Raises InputError, in one line, where the file holds none.
     """
     try:
-        entries = json.loads(Path(path).read_text(encoding="utf-8"))
+        entries = json.loads(Path(path).read_text(encoding="utf-8"), object_hook=_named)
         kinds = {_place(kind): kind for kind in answers()}
         return kinds[entries["schema"]].model_validate(entries, by_alias=False, by_name=True)
     except OSError as error:
@@ -80,6 +81,11 @@ def found_in(path: Path, given: MachineModel, catalogue: Catalogue) -> MachineMo
             "the place of EFFECT"
         )
     return parse_model(tomllib.loads(text), catalogue, entries["mujoco"] or given.mjcf, str(path))
+
+
+def _named(entries: dict[str, Any]) -> dict[str, Any]:
+    """The entries of an object under the names of fields: `or` is none in Python."""
+    return {f"{key}_" if iskeyword(key) else key: value for key, value in entries.items()}
 
 
 def _place(answer: type[Answer]) -> str:

@@ -326,7 +326,7 @@ def agree_text(result: Agreement) -> str:
     lines = []
     for axis, found in result.axes.items():
         lines.append(agreement_in_words(axis, found))
-        lines += [f"  {difference_in_words(d)}" for d in found.differing]
+        lines += [f"  {difference_in_words(n, found.parameters[n])}" for n in found.differing]
         lines += [f"  {cause}" for cause in causes_in_words(found)]
     lines += [f"axis {axis}: not compared, as it has no intervals" for axis in result.not_compared]
     return "\n".join(lines)

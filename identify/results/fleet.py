@@ -8,6 +8,7 @@ from datetime import date
 from enum import Enum
 from pathlib import Path
 
+from twin.record import Number, record
 from twin.signals import Array
 
 
@@ -35,34 +36,36 @@ class Scope(Enum):
     HALL = "hall"
 
 
-@dataclass(frozen=True)
+@record
 class Alarm:
-    """A change of a parameter beyond the stated rate of false alarms, in SI units.
-
-    machine: None where all of the kind changed. night: after which it was told; changed: the first
-    night of it, with the ends of its 90 % band. before, after: means; size: their difference, with
-    half the width of its 90 % band. strength: size beyond the dead band over its standard
-    deviation. trend: how fast it goes on, unit a night; None where it stays. others: parameters
-    that changed with it.
-    """
+    """A change of a parameter beyond the stated rate of false alarms, in SI units."""
 
     machine: str | None
+    """None where all of the kind changed."""
     axis: str
     model: str
     parameter: str
     unit: str
     night: date
+    """After which it was told."""
     changed: date
+    """The first night of it."""
     earliest: date
+    """Of the 90 % band of that night."""
     latest: date
-    before: float
-    after: float
-    size: float
-    half_width: float
-    strength: float
+    before: Number
+    """Mean, as of what was after."""
+    after: Number
+    size: Number
+    half_width: Number
+    """Half of the 90 % band of the size."""
+    strength: Number
+    """The size beyond the dead band over its standard deviation."""
     scope: Scope
-    trend: float | None = None
+    trend: Number | None = None
+    """How fast it goes on, unit a night; None where it stays."""
     others: tuple[str, ...] = ()
+    """Parameters that changed with it."""
 
     @property
     def relative(self) -> float:
@@ -70,35 +73,34 @@ class Alarm:
         return self.size / abs(self.before) if self.before else float("inf")
 
 
-@dataclass(frozen=True)
+@record
 class Off:
-    """A machine whose parameter is far from its kind's; far: in deviations between machines."""
+    """A machine whose parameter is far from its kind's."""
 
     machine: str
     axis: str
     parameter: str
     unit: str
-    value: float
-    usual: float
-    far: float
+    value: Number
+    usual: Number
+    far: Number
+    """In deviations between machines."""
 
 
-@dataclass(frozen=True)
+@record
 class KindParameter:
-    """A parameter of a kind: mean of its machines, and their standard deviation around it.
-
-    expected, deviation: of one machine by its own logs and its kind, and how sure that is; of one
-    without a log what the kind is.
-    """
+    """A parameter of a kind: mean of its machines, and their standard deviation around it."""
 
     axis: str
     parameter: str
     unit: str
-    mean: float
-    spread: float
+    mean: Number
+    spread: Number
     machines: int
-    expected: float
-    deviation: float
+    expected: Number
+    """Of one machine by its own logs and its kind; of one without a log what the kind is."""
+    deviation: Number
+    """How sure that is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,19 +128,20 @@ class Course:
         return "rad" if "N m" in self.unit or "kg m" in self.unit else "m"
 
 
-@dataclass(frozen=True)
+@record
 class MachineState:
-    """How a machine stands. nights: that were fitted; last: the last of them; faulty: bad logs.
-
-    ratio: force error over noise floor in the last nights, the largest of its axes.
-    """
+    """How a machine stands."""
 
     machine: str
     model: str
     nights: int
+    """That were fitted."""
     last: date | None
+    """The last of them."""
     faulty: int
-    ratio: float
+    """Bad logs."""
+    ratio: Number
+    """Force error over noise floor in the last nights, the largest of its axes."""
     alarms: tuple[Alarm, ...]
     off: tuple[Off, ...]
 
@@ -174,43 +177,41 @@ class Floor:
         return tuple(alarm for machine in self.machines for alarm in machine.alarms)
 
 
-@dataclass(frozen=True)
+@record
 class Told:
     """What changed on a machine, and on which night; of what was found by how much."""
 
     machine: str
     what: str
     night: date
-    size: float | None = None
+    size: Number | None = None
     unit: str | None = None
 
 
-@dataclass(frozen=True)
+@record
 class LiveAlarm:
-    """A change of the force error of a machine that runs, in ``unit`` RMS.
-
-    time: s of the log at which it was told; changed: since when.
-    """
+    """A change of the force error of a machine that runs, in ``unit`` RMS."""
 
     axis: str
-    time: float
-    changed: float
-    before: float
-    after: float
+    time: Number
+    """s of the log at which it was told."""
+    changed: Number
+    """s of the log since when."""
+    before: Number
+    after: Number
     unit: str
 
 
-@dataclass(frozen=True)
+@record
 class LiveParameter:
-    """A parameter of a machine that runs: its value now and half its 90 % band, beside the fitted.
-
-    name: of effect and parameter, as lugre.Fc, or mass.
-    """
+    """A parameter of a machine that runs: its value now, beside the fitted one."""
 
     name: str
-    value: float
-    half: float
-    fitted: float
+    """Of effect and parameter, as lugre.Fc, or mass."""
+    value: Number
+    half: Number
+    """Half its 90 % band."""
+    fitted: Number
     unit: str
 
 
@@ -236,14 +237,13 @@ class LiveAxis:
         return None if self.usual is None else 1.645 * self.usual
 
 
-@dataclass(frozen=True)
+@record
 class LiveCause:
-    """What a diagnosis of the minutes after an alarm names; none where it found nothing.
-
-    failed: why there is none, in words; "" where there is one.
-    """
+    """What a diagnosis of the minutes after an alarm names; none where it found nothing."""
 
     axis: str
-    changed: float
+    changed: Number
+    """s of the log since when."""
     named: tuple[str, ...]
     failed: str = ""
+    """Why there is none, in words; "" where there is one."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, inf
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from identify.dataset.preparation import datasets
 from identify.estimation.confounded import linear_bases
@@ -28,77 +29,84 @@ from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.model.machine import MachineModel
 from twin.model.parameters import ParameterReference, all_parameters, free_parameters, read, write
+from twin.record import Number, computed, record
 from twin.signals import Array
 from twin.simulation.simulate import simulate
 from twin.simulation.simulators import ReducedSimulator
 
 
-@dataclass(frozen=True)
+@record
 class Difference:
-    """One parameter in two fits: a, b and the joint standard error in ``unit``.
+    """One parameter in two fits, in ``unit``."""
 
-    limit: of ``ratio``, above which the parameter differs.
-    """
-
-    label: str
-    a: float
-    b: float
-    standard_error: float
+    a: Number
+    b: Number
+    standard_error: Number
+    """Of the difference, the root of the sum of both squared."""
     unit: str
-    limit: float
+    limit: Number
+    """Joint standard errors above which the parameter differs."""
 
-    @property
-    def ratio(self) -> float:
-        """b - a in joint standard errors."""
-        return (self.b - self.a) / self.standard_error if self.standard_error else inf
+    @computed
+    def difference(self) -> Number:
+        """b - a."""
+        return self.b - self.a
 
-    @property
+    @computed
+    def in_standard_errors(self) -> Number:
+        """The difference in joint standard errors."""
+        return self.difference / self.standard_error if self.standard_error else inf
+
+    @computed
     def differs(self) -> bool:
         """Whether it is more than the uncertainties allow."""
-        return abs(self.ratio) > self.limit
+        return abs(self.in_standard_errors) > self.limit
 
 
-@dataclass(frozen=True)
+@record
 class Cause:
-    """An effect that neither fit has and that could make a share of the squared difference.
-
-    alike: other effects that could make the same share.
-    """
+    """An effect that neither fit has and that could make a share of the squared difference."""
 
     effect: str
-    share: float
-    alike: tuple[str, ...] = ()
+    share: Number
+    or_: Annotated[tuple[str, ...], Field(alias="or")] = ()
+    """Other effects that could make the same share."""
 
 
-@dataclass(frozen=True)
+@record
 class AxisAgreement:
-    """Two fits of one axis.
+    """Whether two fits of one axis agree."""
 
-    not_compared: labels without an interval, or held at different values. only_a, only_b: effects
-    that one of the fits has alone. above_floor: force error over noise floor of both fits. force:
-    RMS force (in ``unit``) of the parameters that differ, along a simulated motion; None where
-    nothing differs or no motion can be simulated. causes: effects that together could make the
-    difference, the largest share first.
-    """
-
-    differences: Sequence[Difference]
+    parameters: Mapping[str, Difference]
     not_compared: Sequence[str]
-    only_a: Sequence[str]
-    only_b: Sequence[str]
-    above_floor: tuple[float, float]
-    unit: str
-    force: float | None = None
+    """Without an interval, or held at different values."""
+    only_in_a: Sequence[str]
+    """Effects that one of the fits has alone."""
+    only_in_b: Sequence[str]
+    error_over_noise_floor: tuple[Number, Number]
+    force_unit: str
+    force: Number | None = None
+    """RMS of what the parameters that differ amount to, along a simulated motion; null where
+    nothing differs or no motion can be simulated."""
     causes: Sequence[Cause] = ()
+    """Effects that together could make the difference, the largest share first."""
 
-    @property
-    def differing(self) -> list[Difference]:
+    @computed
+    def differing(self) -> list[str]:
         """The parameters that differ, the surest first."""
-        return sorted((d for d in self.differences if d.differs), key=lambda d: -abs(d.ratio))
+        known = self.parameters
+        labels = (label for label, d in known.items() if d.differs)
+        return sorted(labels, key=lambda label: -abs(known[label].in_standard_errors))
+
+    @computed
+    def agree(self) -> bool:
+        """Whether none of them differs."""
+        return not self.differing
 
     @property
     def of_wrong_models(self) -> bool:
         """Whether a fit's error is more than noise, so that its intervals are scatter alone."""
-        return max(self.above_floor) > RULE.at_floor
+        return max(self.error_over_noise_floor) > RULE.at_floor
 
 
 @dataclass(frozen=True, repr=False)
@@ -109,9 +117,9 @@ class Agreement(Printed):
     not_compared: Sequence[str] = ()
 
     @property
-    def agrees(self) -> bool:
+    def agree(self) -> bool:
         """Whether no parameter differs by more than the uncertainties allow."""
-        return not any(axis.differing for axis in self.axes.values())
+        return all(axis.agree for axis in self.axes.values())
 
 
 def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreement:
@@ -126,7 +134,7 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
         if not all(axis in fit.intervals and fit.intervals[axis].ends for fit in (a, b)):
             continue
         found = _compared(a, b, axis)
-        if found.differences:
+        if found.parameters:
             axes[axis] = _explained(found, a, b, axis, catalogue) if found.differing else found
     if not axes:
         raise InputError(
@@ -166,7 +174,7 @@ def _compared(a: MachineModel, b: MachineModel, axis: str) -> AxisAgreement:
             skipped.append(label)
     limit = _limit(len(pairs))
     return AxisAgreement(
-        tuple(Difference(label, *pair, limit) for label, pair in pairs.items()),
+        {label: Difference(*pair, limit) for label, pair in pairs.items()},
         tuple(skipped), tuple(sorted(own - other)), tuple(sorted(other - own)),
         (a.intervals[axis].above_floor, b.intervals[axis].above_floor),
         units.force,
@@ -209,7 +217,7 @@ def _explained(
     """The same with the force of the difference and the effects that could make it."""
     base = _along_a_motion(a, axis)
     there = _numbers(b, axis)
-    moved = [there[d.label] for d in found.differences if d.differs and d.label in there]
+    moved = [there[label] for label in found.differing if label in there]
     moved = [n for n in moved if n.reference.effect in ("", *a.axes[axis].names)]
     if base is None or not moved:
         return found

@@ -69,7 +69,8 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     for label, found in changed.axes.items():
         said += [
             f"the machine with {added:.3g} kg more: {agreement_in_words(label, found)}",
-            *map(difference_in_words, found.differing), *causes_in_words(found),
+            *(difference_in_words(n, found.parameters[n]) for n in found.differing),
+            *causes_in_words(found),
         ]  # fmt: skip
     return Found(numbers, said, [picture(
         "Difference of the parameters of two fits, in joint standard errors. Dashed: what the "
@@ -95,12 +96,12 @@ def _listed(errors: Mapping[str, float]) -> str:
 
 
 def _differences(found: Agreement, title: str) -> Panel:
-    shown = [d for axis in found.axes.values() for d in axis.differences]
-    limit, place = max(d.limit for d in shown), np.arange(len(shown))[::-1]
-    ratios = np.clip([d.ratio for d in shown], -REACH, REACH)
+    shown = [one for axis in found.axes.values() for one in axis.parameters.items()]
+    limit, place = max(d.limit for _, d in shown), np.arange(len(shown))[::-1]
+    ratios = np.clip([d.in_standard_errors for _, d in shown], -REACH, REACH)
     allowed = [Line([x, x], [place[0], place[-1]], "", GREY, "--") for x in (-limit, limit)]
     return Panel(
         *allowed, Line(ratios, place, "", BLUE, "o"), title=title, yticks=place,
-        yticklabels=[d.label for d in shown], xlim=(-1.1 * REACH, 1.1 * REACH),
+        yticklabels=[label for label, _ in shown], xlim=(-1.1 * REACH, 1.1 * REACH),
         xlabel="Difference (joint standard errors)",
     )  # fmt: skip

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import singledispatch
-from keyword import iskeyword
 from math import isfinite
 from pathlib import Path
 from types import SimpleNamespace
@@ -64,9 +63,9 @@ class Entry(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _of_json(cls, value: Any) -> Any:
-        """An object that was read: less its place in the schema; `or` is no name in Python."""
+        """An object that was read: less its place in the schema."""
         if isinstance(value, dict):
-            return {f"{k}_" if iskeyword(k) else k: v for k, v in value.items() if k != "schema"}
+            return {k: v for k, v in value.items() if k != "schema"}
         return value
 
     @field_validator("*", mode="before")

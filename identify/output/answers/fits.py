@@ -18,7 +18,7 @@ from identify.output.words.fit import (
     region_in_words,
 )
 from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
-from identify.validation.agreement import Agreement
+from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
 
 # --- fits ------------------------------------------------------------------------------------
@@ -221,63 +221,19 @@ def _motion_fit(fit: MotionFit, held: tuple[float, float] | None) -> SimulationF
 # --- whether two fits agree ------------------------------------------------------------------
 
 
-class DifferenceEntry(Entry):
-    """A parameter of two fits."""
-
-    a: Number
-    b: Number
-    difference: Number
-    standard_error: Number
-    in_standard_errors: Number = read("ratio")
-    limit: Number
-    differs: bool
-    unit: str
-
-
-class CauseEntry(Entry):
-    """An absent effect that would make a share of the difference."""
-
-    effect: str
-    share: Number
-    or_: list[str] = Field(validation_alias="alike", serialization_alias="or")
-
-
-class AgreementEntry(Entry):
-    """Whether the fits of an axis agree."""
-
-    agree: bool
-    parameters: dict[str, DifferenceEntry]
-    differing: list[str]
-    not_compared: list[str]
-    only_in_a: list[str] = read("only_a")
-    only_in_b: list[str] = read("only_b")
-    error_over_noise_floor: list[Number] = read("above_floor")
-    force: Number
-    """What the parameters that differ amount to, RMS."""
-    force_unit: str = read("unit")
-    causes: list[CauseEntry]
-
-
 class AgreementAnswer(Answer):
     """What `twin agree` prints."""
 
     a: str | None = None
     b: str | None = None
-    agree: bool = read("agrees")
-    axes: dict[str, AgreementEntry]
+    agree: bool
+    axes: dict[str, AxisAgreement]
     not_compared: list[str]
 
 
 @answer_of.register
 def _(result: Agreement, **more: Any) -> AgreementAnswer:
-    axes = {}
-    for axis, found in result.axes.items():
-        every = {d.label: DifferenceEntry.of(d, difference=d.b - d.a) for d in found.differences}
-        differing = [d.label for d in found.differing]
-        axes[axis] = AgreementEntry.of(
-            found, agree=not differing, parameters=every, differing=differing
-        )
-    return AgreementAnswer.of(result, axes=axes, **more)
+    return AgreementAnswer.of(result, **more)
 
 
 # --- feedforward -----------------------------------------------------------------------------

@@ -293,18 +293,18 @@ def moved_in_words(moved: MovedParameter) -> str:
 
 def agreement_in_words(axis: str, found: AxisAgreement) -> str:
     """Whether two fits of an axis agree."""
-    total = len(found.differences)
+    total = len(found.parameters)
     if found.differing:
         return f"axis {axis}: the fits differ in {len(found.differing)} of {total} parameters"
     return f"axis {axis}: the fits agree in all {total} parameters that can be compared"
 
 
-def difference_in_words(d: Difference) -> str:
+def difference_in_words(label: str, d: Difference) -> str:
     """One parameter that differs."""
     first, second = change(d.a, d.b, d.unit)
     return (
-        f"{d.label} differs by {quantity(d.b - d.a, d.unit)} ({first} and {second}), "
-        f"{number(abs(d.ratio))} joint standard errors; allowed are {number(d.limit)}"
+        f"{label} differs by {quantity(d.difference, d.unit)} ({first} and {second}), "
+        f"{number(abs(d.in_standard_errors))} joint standard errors; allowed are {number(d.limit)}"
     )
 
 
@@ -313,21 +313,21 @@ def causes_in_words(found: AxisAgreement) -> list[str]:
 
     Nothing where the fits agree.
     """
-    words = units_of(found.unit).words
-    only = (("first", found.only_a), ("second", found.only_b))
+    words = units_of(found.force_unit).words
+    only = (("first", found.only_in_a), ("second", found.only_in_b))
     said = [f"only the {which} fit has {', '.join(names)}" for which, names in only if names]
     if found.force is not None:
-        force = quantity(found.force, found.unit)
+        force = quantity(found.force, found.force_unit)
         said.append(f"the parameters that differ amount to {force} RMS")
         if not found.causes:
             said.append(words("no absent effect with linear parameters has such a force"))
         said += [
-            f"{' or '.join([c.effect, *c.alike])} would make {percent(c.share)} of this "
+            f"{' or '.join([c.effect, *c.or_])} would make {percent(c.share)} of this "
             f"difference ({words('squared force')})"
             for c in found.causes
         ]
     if found.of_wrong_models:
-        first, second = found.above_floor
+        first, second = found.error_over_noise_floor
         said.append(
             f"the errors are {first:.1f} and {second:.1f} times the noise floor: the model is "
             "wrong, so this tells whether the machines are alike, not whether the values are right"

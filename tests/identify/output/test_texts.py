@@ -145,7 +145,7 @@ TEXTS: dict[str, Callable[[], object]] = {
     "fit of simulated motion without other logs": lambda: made.simulation_fit(held=None),
     "two fits": lambda: Agreement({"x": made.SAME, "y": made.OTHER}, ("z",)),
     "two fits without a cause": lambda: Agreement(
-        {"y": replace(made.OTHER, causes=(), above_floor=(1.1, 1.0))}
+        {"y": replace(made.OTHER, causes=(), error_over_noise_floor=(1.1, 1.0))}
     ),
     "comparison": made.compared,
     "comparison without a region above noise": lambda: made.Comparison(

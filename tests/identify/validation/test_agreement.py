@@ -39,13 +39,13 @@ def fitted(width: float = 0.01, above: float = 1.1, **moved: float) -> MachineMo
 
 
 def test_what_differs_is_named_with_its_size_and_the_effects_that_would_make_it() -> None:
-    assert identify.agree(fitted(), fitted(coulomb_viscous__sigma2=0.202), catalogue=FEW).agrees
+    assert identify.agree(fitted(), fitted(coulomb_viscous__sigma2=0.202), catalogue=FEW).agree
     other = fitted(mass=10.5, cable_slab__offset=0.3)
     found = agreement(fitted(), other, FEW).axes["x"]
-    assert {d.label for d in found.differing} == {"mass", "cable_slab.offset"}
-    mass = next(d for d in found.differing if d.label == "mass")
-    assert mass.b - mass.a == pytest.approx(0.5)
-    assert mass.ratio == pytest.approx(0.5 / mass.standard_error)
+    assert set(found.differing) == {"mass", "cable_slab.offset"}
+    mass = found.parameters["mass"]
+    assert mass.difference == pytest.approx(0.5)
+    assert mass.in_standard_errors == pytest.approx(0.5 / mass.standard_error)
     # Half widths of 1 % of 10 kg and of 10.5 kg, 1.714 standard errors each (Student's t of 23).
     assert mass.standard_error == pytest.approx((0.1001**2 + 0.1051**2) ** 0.5 / 1.714, rel=1e-3)
     assert {c.effect for c in found.causes} == {"payload_mass", "constant_force"}
@@ -63,8 +63,8 @@ def with_alone(effect: str, **values: float) -> MachineModel:
 @pytest.mark.slow
 def test_an_effect_that_one_fit_has_alone_is_one_of_no_strength_in_the_other() -> None:
     found = agreement(fitted(), with_alone("constant_force", F0=0.2), FEW).axes["x"]
-    assert found.only_b == ("constant_force",)
-    assert [d.label for d in found.differing] == ["constant_force.F0"]
+    assert found.only_in_b == ("constant_force",)
+    assert found.differing == ["constant_force.F0"]
 
 
 @pytest.mark.slow
@@ -73,7 +73,7 @@ def test_what_makes_no_force_where_the_axis_moves_has_no_cause() -> None:
     ends = {"low": -0.5, "high": 0.5}
     both = (with_alone("end_stop", **ends, stiffness=k) for k in (1e3, 5e3))
     found = agreement(*both, FEW).axes["x"]
-    assert [d.label for d in found.differing] == ["end_stop.stiffness"]
+    assert found.differing == ["end_stop.stiffness"]
     assert (found.force, found.causes) == (0.0, ())
 
 
