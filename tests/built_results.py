@@ -39,6 +39,7 @@ from identify.validation.misfit_maps import MisfitMap, Region
 from identify.validation.tracking import AxisTracking, TrackingError
 from identify.validation.whiteness import Correlation, Feedback, ResidualTests
 from twin.experiments.kinds import Passes, Tracking
+from twin.feedforward import followed
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
@@ -315,5 +316,7 @@ def addition(kept: bool = True) -> Addition:
 def feedforward() -> Feedforward:
     """Of a model whose static friction no feedforward holds."""
     every = (TrackingError(o * 1e-6, 3.1 * o * 1e-6) for o in (9.7, 4.3, 1.9))
-    found = AxisTracking(*every, {"cogging": 2.3e-6, "lugre": 7.1e-7})
+    found = AxisTracking(
+        "m", *every, {"cogging": 2.3e-6, "lugre": 7.1e-7}, followed(MODEL.axes["x"]).lost
+    )
     return Feedforward(MODEL, MODEL, ("run 1", "run 2"), {"x": found})

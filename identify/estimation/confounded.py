@@ -25,35 +25,34 @@ from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted
 from twin.model.parameters import ParameterReference, read
 from twin.model.units import LINEAR
+from twin.record import Number, record
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@record
 class ParameterShift:
-    """A parameter that a fit moved by more than its interval.
+    """A parameter that a fit moved by more than its interval."""
 
-    before, after: in ``unit``. force: RMS force that the change makes, in ``force_unit``. alike:
-    absent effects that can produce the same force.
-    """
-
-    label: str
-    before: float
-    after: float
+    parameter: str
+    before: Number
+    after: Number
     unit: str
-    force: float
-    alike: tuple[str, ...] = ()
+    force: Number
+    """RMS force that the change makes."""
+    same_force_as: tuple[str, ...] = ()
+    """Absent effects that can produce the same force."""
     force_unit: str = LINEAR.force
 
 
-@dataclass(frozen=True)
+@record
 class Refit:
-    """RMS force errors of an axis before and after a fit, in ``unit``, and the main changes."""
+    """RMS force errors of an axis before and after a fit, and what it changed most."""
 
-    given: float
-    refitted: float
-    changes: tuple[ParameterShift, ...]
-    unit: str = LINEAR.force
+    force_error_as_given: Number
+    force_error: Number
+    changed: tuple[ParameterShift, ...]
+    force_unit: str = LINEAR.force
 
 
 def refit(given: AxisModel, fit: Fit, catalogue: Catalogue) -> Refit:

@@ -24,24 +24,25 @@ from identify.rules import RULE
 from twin.effect import CHANNELS
 from twin.logs import LINEAR_UNITS
 from twin.model.units import LINEAR, AxisUnits
+from twin.record import Number, record
 from twin.signals import Array
 
 BINS = (24, 96, 384)  # numbers of bins along a coordinate
 SAME_PERIOD = 0.02  # relative difference, or of a turn, within which two are one
 
 
-@dataclass(frozen=True)
+@record
 class Dependence:
-    """Part of the squared error above the floor that one coordinate accounts for.
+    """On what coordinate an error depends."""
 
-    share_of_error: 0..1 of the squared force error. period: in ``unit``, or None. error: N.
-    """
-
-    share_of_error: float
+    share_of_error: Number
+    """0..1 of the squared force error above the floor, that it accounts for."""
     depends_on: str
-    period: float | None
+    period: Number | None
     unit: str
-    shares: Mapping[str, float]
+    """Of the coordinate."""
+    shares: Mapping[str, Number]
+    """The same part of every coordinate."""
 
 
 # Of a linear axis; ``unit_of`` gives those of any.

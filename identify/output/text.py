@@ -316,7 +316,7 @@ def feedforward_text(result: Feedforward) -> str:
             f"    with all but {e}: RMS {by_how_much(gain, unit)}"
             for e, gain in found.gains.items()
         ]
-        lines += [f"  not in it: {e}, {why}" for e, why in result.lost[axis].items()]
+        lines += [f"  not in it: {e}, {why}" for e, why in result.axes[axis].lost.items()]
     return "\n".join(lines)
 
 

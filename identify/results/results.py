@@ -29,7 +29,6 @@ from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import Region
 from identify.validation.tracking import AxisTracking
 from twin.effect import Effect
-from twin.feedforward import followed
 from twin.model.machine import HistoryStep, MachineModel
 from twin.model.parameters import ParameterReference, free_parameters, read
 
@@ -123,11 +122,6 @@ class Feedforward(Printed):
     before: MachineModel | None
     logs: tuple[str, ...]
     axes: Mapping[str, AxisTracking]
-
-    @property
-    def lost(self) -> Mapping[str, Mapping[str, str]]:
-        """By axis and effect, what the feedforward cannot hold, and why."""
-        return {name: followed(self.model.axes[name]).lost for name in self.axes}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,26 +9,25 @@ has noted at its end.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.findings import Finding
 from identify.selection.search import Found
 from identify.selection.trying import refitted_on
+from twin.record import Number, record
 
 
-@dataclass(frozen=True)
+@record
 class RoleDependent:
-    """A law that is proved by the one log and not by the other.
-
-    effect: its name. named: whether it is proved as the roles are, and not with them exchanged; or
-    the other way round. part, t: of the score that refuses it.
-    """
+    """A law that is proved or not by which log chooses."""
 
     effect: str
     named: bool
-    part: float
-    t: float
+    """Whether it is proved as the roles are; else it is where other logs choose."""
+    part: Number
+    """Of the score that refuses it, as t is."""
+    t: Number
 
 
 def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDependent, ...]:

@@ -17,6 +17,7 @@ from identify.estimation.force_balance import unbalanced
 from identify.estimation.residual_dependence import UNITS, unit_of
 from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
+from twin.record import Number, record
 from twin.signals import Array
 
 ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
@@ -49,22 +50,22 @@ class MisfitMap:
     force_unit: str = LINEAR.force
 
 
-@dataclass(frozen=True)
+@record
 class Region:
-    """A bin of a coordinate with a large error: RMS, ratio to noise floor, share of squared error.
-
-    rms: in ``force_unit``. visited: share of time; of a frequency band that of the squared force.
-    """
+    """A bin of a coordinate with a large error."""
 
     coordinate: str
-    unit: str
-    low: float
-    high: float
-    rms: float
-    ratio: float
-    share: float
-    force_unit: str = LINEAR.force
-    visited: float = 0.0
+    coordinate_unit: str
+    low: Number
+    high: Number
+    error: Number
+    """RMS."""
+    over_noise_floor: Number
+    share_of_error: Number
+    """Part of the squared error."""
+    unit: str = LINEAR.force
+    visited: Number = 0.0
+    """Part of the time; of a frequency band that of the squared force."""
 
 
 def worst_region(fit: Fit, dataset: Dataset) -> Region | None:

@@ -8,7 +8,7 @@ much earlier as the machine's drive is late.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -22,31 +22,35 @@ from twin.feedforward import feedforward, followed
 from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, silent
+from twin.record import Number, record
 from twin.signals import Array, between, moving_mean, rate
 from twin.simulation.loop import POSITION_COLUMN, Controller
 from twin.simulation.simulators import ReducedSimulator, run
 
 
-@dataclass(frozen=True)
+@record
 class TrackingError:
-    """Setpoint minus true position over all logs, m."""
+    """Setpoint minus true position over all logs, in the unit of the axis."""
 
-    rms: float
-    largest: float
+    rms: Number
+    largest: Number
 
 
-@dataclass(frozen=True)
+@record
 class AxisTracking:
-    """Tracking errors of one axis."""
+    """Tracking errors of an axis in simulation."""
 
+    unit: str
     without: TrackingError
     """Under feedback alone."""
     before: TrackingError | None
     """With the feedforward of the model before."""
     diagnosed: TrackingError
     """With that of the model itself."""
-    gains: Mapping[str, float]
-    """By effect, by how much the RMS error (m) grows where the feedforward leaves it out."""
+    gains: Mapping[str, Number]
+    """By effect, by how much the RMS error grows where the feedforward leaves it out."""
+    lost: Mapping[str, str]
+    """Effects that the feedforward cannot hold, and why."""
 
     @property
     def by_feedforward(self) -> dict[str, TrackingError]:
@@ -89,10 +93,12 @@ def tracking(
     grown = dict(zip(variants, others, strict=True))
     return {
         a: AxisTracking(
+            model.axes[a].units.position,
             without[a],
             with_before.get(a),
             diagnosed[a],
             {e: own[a].rms - diagnosed[a].rms for (axis, e), own in grown.items() if axis == a},
+            followed(model.axes[a]).lost,
         )
         for a in names
     }

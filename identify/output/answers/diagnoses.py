@@ -7,13 +7,14 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from identify.dataset.dataset import Role
+from identify.estimation.confounded import Refit
+from identify.estimation.residual_dependence import Dependence
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
 from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
     RecordingEntry,
-    RefitEntry,
     estimate_entries,
 )
 from identify.output.answers.plans import PlanAnswer
@@ -30,6 +31,7 @@ from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind
+from identify.selection.roles import RoleDependent
 from identify.validation.misfit_maps import Region
 from twin.curve import Coordinate
 from twin.knee import Imitated
@@ -236,28 +238,6 @@ class FindingEntry(Entry):
     shape: ShapeEntry | None
 
 
-class DependenceEntry(Entry):
-    """On what an unexplained error depends."""
-
-    share_of_error: Number
-    depends_on: str
-    period: Number
-    unit: str
-
-
-class RegionEntry(Entry):
-    """Where an error is largest."""
-
-    coordinate: str
-    low: Number
-    high: Number
-    coordinate_unit: str = read("unit")
-    error: Number = read("rms")
-    over_noise_floor: Number = read("ratio")
-    share_of_error: Number = read("share")
-    unit: str = read("force_unit")
-
-
 class RemainderEntry(Entry):
     """What stands above the noise floor beside the findings."""
 
@@ -268,7 +248,7 @@ class RemainderEntry(Entry):
     error: Number
     over_noise_floor: Number = read("ratio")
     unit: str
-    where: RegionEntry | None
+    where: Region | None
     advice: str
 
 
@@ -294,16 +274,6 @@ def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None
 # --- diagnoses -------------------------------------------------------------------------------
 
 
-class RoleDependentEntry(Entry):
-    """A law that is proved or not by which log chooses."""
-
-    effect: str
-    named: bool
-    """Whether it is proved as the roles are; else it is where other logs choose."""
-    part: Number
-    t: Number
-
-
 class DiagnosisEntry(Entry):
     """The diagnosis of an axis."""
 
@@ -319,8 +289,8 @@ class DiagnosisEntry(Entry):
     """Part of the squared error above the noise floor that all findings together remove."""
     needed_together: list[str]
     also_seen: list[str] = read("small")
-    depends_on_roles: list[RoleDependentEntry] = read("by_roles")
-    unexplained: DependenceEntry | None
+    depends_on_roles: list[RoleDependent] = read("by_roles")
+    unexplained: Dependence | None
     remainder: RemainderEntry | None
     repeats_not_general: RepeatEntry | None = read("repeat")
     ranking: list[CandidateEntry]
@@ -336,7 +306,7 @@ class DiagnosisEntry(Entry):
     parameters: dict[str, EstimateEntry]
     force_shift: Number = read("dataset.channel_delay")
     force_shift_unit: str = "s"
-    refit: RefitEntry | None
+    refit: Refit | None
     not_tried: list[str]
     notes: list[str]
     next_experiment: PlanAnswer | None

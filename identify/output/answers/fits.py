@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from identify.estimation.confounded import Refit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.answers import LOWER, Answer, Entry, Number, answer_of, read
@@ -20,6 +21,7 @@ from identify.output.words.fit import (
 from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
 from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
+from identify.validation.tracking import AxisTracking
 
 # --- fits ------------------------------------------------------------------------------------
 
@@ -32,27 +34,6 @@ class EstimateEntry(Entry):
     free: bool
     interval_90: tuple[Number, Number] | None
     interval_refused: str | None
-
-
-class ChangeEntry(Entry):
-    """A parameter that a fit changed, and the force that the change makes."""
-
-    parameter: str = read("label")
-    before: Number
-    after: Number
-    unit: str
-    force: Number
-    force_unit: str
-    same_force_as: list[str] = read("alike")
-
-
-class RefitEntry(Entry):
-    """What fitting changed of the given model."""
-
-    force_error_as_given: Number = read("given")
-    force_error: Number = read("refitted")
-    force_unit: str = read("unit")
-    changed: list[ChangeEntry] = read("changes")
 
 
 class FitEntry(Entry):
@@ -75,7 +56,7 @@ class FitEntry(Entry):
     beginnings_left_out: dict[str, Number]
     beginnings_left_out_unit: str = "s"
     parameters: dict[str, EstimateEntry]
-    refit: RefitEntry | None
+    refit: Refit | None
 
 
 class RecordingEntry(Entry):
@@ -239,41 +220,16 @@ def _(result: Agreement, **more: Any) -> AgreementAnswer:
 # --- feedforward -----------------------------------------------------------------------------
 
 
-class TrackingErrorEntry(Entry):
-    """Setpoint minus true position: RMS and largest."""
-
-    rms: Number
-    largest: Number
-
-
-class AxisTrackingEntry(Entry):
-    """Tracking errors of an axis in simulation, and what each effect gains of the RMS."""
-
-    unit: str
-    without: TrackingErrorEntry
-    before: TrackingErrorEntry | None
-    diagnosed: TrackingErrorEntry
-    gains: dict[str, Number]
-    lost: dict[str, str]
-    """Effects that the feedforward cannot hold, and why."""
-
-
 class FeedforwardAnswer(Answer):
     """What `twin feedforward` prints."""
 
     logs: list[str]
-    axes: dict[str, AxisTrackingEntry]
+    axes: dict[str, AxisTracking]
 
 
 @answer_of.register
 def _(result: Feedforward, **more: Any) -> FeedforwardAnswer:
-    axes = {
-        name: AxisTrackingEntry.of(
-            found, unit=result.model.axes[name].units.position, lost=result.lost[name]
-        )
-        for name, found in result.axes.items()
-    }
-    return FeedforwardAnswer.of(result, axes=axes, **more)
+    return FeedforwardAnswer.of(result, **more)
 
 
 # --- comparisons -----------------------------------------------------------------------------

@@ -83,5 +83,5 @@ def worth(view: AxisView) -> list[Block]:
         f"With all but {effect} fed forward, the RMS error is {by_how_much(gain, unit)}."
         for effect, gain in found.gains.items()
     ]
-    told += [f"Not in it: {effect}, {why}." for effect, why in result.lost[view.name].items()]
+    told += [f"Not in it: {effect}, {why}." for effect, why in result.axes[view.name].lost.items()]
     return [TableBlock(("Tracking error", "RMS", "Largest"), rows, caption), Listing(told)]

@@ -57,17 +57,19 @@ def regions_table(axis: AxisComparison, model: str) -> TableBlock:
     """The regions whose share of the error most exceeds their share of time, in that order."""
     columns: dict[str, Callable[[Region], str]] = {
         "Where": lambda r: capitalised(place_in_words(r)).removesuffix("."),
-        "RMS error": lambda r: quantity(r.rms, r.force_unit),
-        "Times noise floor": lambda r: number(r.ratio),
-        "Share of squared error": lambda r: percent(r.share),
+        "RMS error": lambda r: quantity(r.error, r.unit),
+        "Times noise floor": lambda r: number(r.over_noise_floor),
+        "Share of squared error": lambda r: percent(r.share_of_error),
         "Share of time": lambda r: percent(r.visited),
-        "Difference": lambda r: percent(r.share - r.visited),
+        "Difference": lambda r: percent(r.share_of_error - r.visited),
     }
     caption = (
         f"{model}The worst region of each coordinate, in the order of the difference of the two "
         "shares. Of a frequency band the share of time is that of the squared force."
     )
-    return TableBlock.of(axis.worst, columns, axis.units.words(caption), bar=lambda r: r.share)
+    return TableBlock.of(
+        axis.worst, columns, axis.units.words(caption), bar=lambda r: r.share_of_error
+    )
 
 
 def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: str) -> TableBlock:

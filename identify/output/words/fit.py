@@ -263,20 +263,20 @@ def change_in_words(change: ParameterShift) -> str:
     force = units_of(change.force_unit).words("force")
     values = arrow(change.before, change.after, change.unit)
     size = quantity(change.force, change.force_unit)
-    said = f"{change.label} {values} changes the {force} by {size}"
-    if not change.alike:
+    said = f"{change.parameter} {values} changes the {force} by {size}"
+    if not change.same_force_as:
         return said
-    verb = "give" if len(change.alike) > 1 else "gives"
-    return f"{said} ({' and '.join(change.alike)} {verb} the same {force})"
+    verb = "give" if len(change.same_force_as) > 1 else "gives"
+    return f"{said} ({' and '.join(change.same_force_as)} {verb} the same {force})"
 
 
 def refit_in_words(refit: Refit) -> str | None:
     """What fitting changed of the given model, or None where its values were good."""
-    if not refit.changes:
+    if not refit.changed:
         return None
-    error = units_of(refit.unit).words("force error")
-    before, after = each_with_unit(refit.given, refit.refitted, refit.unit)
-    changes = ", ".join(map(change_in_words, refit.changes))
+    error = units_of(refit.force_unit).words("force error")
+    before, after = each_with_unit(refit.force_error_as_given, refit.force_error, refit.force_unit)
+    changes = ", ".join(map(change_in_words, refit.changed))
     return f"with the given values the {error} is {before}, after the fit {after}: {changes}"
 
 
@@ -346,8 +346,8 @@ def region_in_words(region: Region) -> str:
     Beside the share of the error that of the time, or of a band that of the squared force: regions
     are in the order of the difference.
     """
-    rms, share = quantity(region.rms, region.force_unit), percent(region.share)
-    over = f"{number(region.ratio)} times the noise floor"
+    rms, share = quantity(region.error, region.unit), percent(region.share_of_error)
+    over = f"{number(region.over_noise_floor)} times the noise floor"
     of = "squared force" if region.coordinate == "frequency" else "time"
     part = f"{share} of the squared error in {percent(region.visited)} of the {of}"
     return f"{place_in_words(region)}: {rms} RMS, {over}, {part}"
@@ -365,8 +365,8 @@ def place_in_words(region: Region) -> str:
         return "at standstill" if region.low > 0.0 else "in motion"
     if region.coordinate == "direction":
         return "moving forwards" if region.low > -0.5 else "moving backwards"
-    coordinate = units_of(region.unit).words(spaced(region.coordinate))
-    return f"{coordinate} between {span(region.low, region.high, region.unit)}"
+    coordinate = units_of(region.coordinate_unit).words(spaced(region.coordinate))
+    return f"{coordinate} between {span(region.low, region.high, region.coordinate_unit)}"
 
 
 def dependence_in_words(dependence: Dependence) -> str:

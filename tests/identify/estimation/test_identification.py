@@ -102,30 +102,32 @@ def fit_to(label: str, value: float) -> FitResult:
 )
 def test_the_value_that_was_off_is_told_first(label: str, value: float) -> None:
     found = fit_to(label, value).refits["x"]
-    first = found.changes[0]
-    assert first.label == label
+    first = found.changed[0]
+    assert first.parameter == label
     assert first.after == pytest.approx(value, rel=0.02)
-    assert found.refitted < 0.2 * found.given
-    assert first.alike == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
+    assert found.force_error < 0.2 * found.force_error_as_given
+    assert first.same_force_as == ((SAME_FORCE[label],) if label in SAME_FORCE else ())
     assert label in str(refit_in_words(found))
-    forces = [change.force for change in found.changes]
+    forces = [change.force for change in found.changed]
     assert forces == sorted(forces, reverse=True)
     assert len(forces) <= 3
-    assert forces[-1] > 0.1 * found.given
-    assert forces[0] == pytest.approx((found.given**2 - found.refitted**2) ** 0.5, rel=0.1)
+    assert forces[-1] > 0.1 * found.force_error_as_given
+    assert forces[0] == pytest.approx(
+        (found.force_error_as_given**2 - found.force_error**2) ** 0.5, rel=0.1
+    )
 
 
 @pytest.mark.slow
 def test_true_values_are_not_told_and_what_is_said_to_be_the_same_force_is() -> None:
     """With the mass held, that effect takes the error to where refitting the mass did."""
     true = NOMINAL.axes["x"]["cable_slab"].values["offset"]
-    assert fit_to("cable_slab.offset", true).refits["x"].changes == ()
+    assert fit_to("cable_slab.offset", true).refits["x"].changed == ()
     found = fit_to("mass", 15.6).refits["x"]
     held = replace(NOMINAL.axes["x"], mass_fixed=True)
     model = NOMINAL.with_axis("x", held)
-    effect = CATALOGUE[found.changes[0].alike[0]]
+    effect = CATALOGUE[found.changed[0].same_force_as[0]]
     added = adding.add(effect, model, {"fit": logged("mass", 15.6)}, axis="x")
-    assert added.step.fit_error_after < 1.01 * found.refitted
+    assert added.step.fit_error_after < 1.01 * found.force_error
 
 
 FRICTION = Fitted.at_start(CATALOGUE["coulomb_viscous"], {"Fc": 1.5, "Fs": 1.5, "sigma2": 3.5})

@@ -131,7 +131,7 @@ def test_regions_are_told_above_floor_and_share_the_largest_excess_first():
     found = worst_regions(maps, MANY)
     assert [r.coordinate for r in found] == ["b", "d", "c"]
     assert [r.low for r in found] == [1.0, 1.0, 1.0]
-    assert found[0].share == pytest.approx(0.8)
+    assert found[0].share_of_error == pytest.approx(0.8)
     assert [r.coordinate for r in worst_regions(maps, MANY, 1)] == ["b"]
 
 
@@ -175,9 +175,9 @@ def test_it_is_where_the_force_is_that_the_model_lacks() -> None:
     there = replace(dataset, training=tuple(map(bumped, dataset.training)))
     region = worst_region(finished(PLAIN, PLAIN, there.training, Outcome.CONVERGED), there)
     assert region is not None
-    assert (region.coordinate, region.unit) == ("position", "m")
+    assert (region.coordinate, region.coordinate_unit) == ("position", "m")
     assert abs(0.5 * (region.low + region.high) - place) < 0.004
-    assert region.ratio > 2.0
+    assert region.over_noise_floor > 2.0
 
 
 def logs(seed: int, **disturbance: float):
