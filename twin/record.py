@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, dataclass_transform
 
 from pydantic import BeforeValidator, ConfigDict, computed_field
 
-from twin.signals import Array
-
 CONFIG = ConfigDict(
     revalidate_instances="always", validate_by_name=True, validate_by_alias=True,
     json_schema_serialization_defaults_required=True,
@@ -33,14 +31,21 @@ def _plain(value: Any) -> Any:
 
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from twin.signals import Array
+
     Number = float
     Values = Array
+    Flags = NDArray[np.bool_]
     computed = property
 else:
     Number = Annotated[float | None, BeforeValidator(lambda v: _known(_plain(v)))]
     """In the JSON null, where it is infinite or no number."""
     Values = Annotated[list[Number], BeforeValidator(_plain)]
-    """An array (n,), in the JSON a list."""
+    Flags = Annotated[list[bool], BeforeValidator(_plain)]
+    """Arrays (n,), in the JSON lists."""
 
     def computed(function):
         """A property that the JSON has too."""

@@ -7,7 +7,7 @@ is one number more where a free curve has ten, so that a far smaller difference 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from statistics import NormalDist
 
@@ -27,6 +27,7 @@ from twin.curve import Coordinate
 from twin.effect import RUBBING
 from twin.model.machine import AxisModel, Fitted
 from twin.model.units import LINEAR
+from twin.record import Number, Values, record
 from twin.signals import Array
 
 BAND = NormalDist().inv_cdf(1.0 - BEYOND)  # standard deviations, to each side
@@ -34,36 +35,35 @@ UNITS = {Coordinate.POSITION: LINEAR.position, Coordinate.SPEED: LINEAR.velocity
 BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Drawn:
     """One curve, each (k,) N: as the law assumes it, as the logs show it, half its 90 % band."""
 
-    assumed: Array
-    found: Array
-    band: Array
+    assumed: Values
+    found: Values
+    band_90: Values
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FoundShape:
-    """A law's curve as it is assumed and as it is found.
-
-    over: its coordinate (k,) in ``unit``, within one period (m) where it has one. lets_go: whether
-    the force is gone at standstill. curves: by direction of motion; not a number where no
-    training log has been.
-    """
+    """A law's curve as it is assumed and as it is found, by direction of motion."""
 
     over: Coordinate
-    coordinate: Array
+    coordinate: Values
+    """(k,), within one period where it has one."""
+    coordinate_unit: str
+    period: Number | None
+    """m"""
+    lets_go_at_standstill: bool
     unit: str
-    period: float | None
-    lets_go: bool
-    force_unit: str
+    """Of the force."""
     curves: Mapping[str, Drawn]
+    """By direction; not a number where no training log has been."""
 
     @property
     def differs(self) -> bool:
         """Whether the curve found surely differs from the one assumed, by its band, anywhere."""
-        pairs = (np.abs(c.found - c.assumed) - c.band for c in self.curves.values())
+        pairs = (np.abs(c.found - c.assumed) - c.band_90 for c in self.curves.values())
         return any(bool(np.any(beyond > 0.0)) for beyond in pairs)
 
 
@@ -96,7 +96,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
         curves[name] = Drawn(
             assumed=been * (weights @ assumed),
             found=been * (weights @ (assumed + correction[own])),
-            band=been * BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
+            band_90=been * BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
         )
     unit = fit.axis.units(UNITS[shape.curve.over])
     force = fit.axis.units.force
@@ -153,16 +153,13 @@ def _corrected(linear: Linearised, stiffness: Mapping[str, float]) -> tuple[Arra
 # --- a parameter that a law holds by design -------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@record
 class FreeExponent:
-    """A parameter of a law, held by design, with which its curve comes nearest to the one found.
-
-    held, found: in ``unit``.
-    """
+    """A parameter of a law, held by design, with which its curve comes nearest to the one found."""
 
     parameter: str
-    held: float
-    found: float
+    held: Number
+    found: Number
     unit: str
 
     @property

@@ -7,7 +7,6 @@ function of position holds for both, and a model with it would not generalise. T
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from identify.estimation.fit import Fit
 from identify.rules import RULE
 from twin.effect import CHANNELS
 from twin.logs import LINEAR_UNITS
-from twin.model.units import LINEAR, AxisUnits
+from twin.model.units import LINEAR
 from twin.record import Number, record
 from twin.signals import Array
 
@@ -174,17 +173,18 @@ def _strongest(records: Sequence[Record]) -> SpectralLine | None:
     return max(found, key=lambda line: line.share, default=None)
 
 
-@dataclass(frozen=True)
+@record
 class Repeat:
-    """A force of one period in position: amplitude (N) and phase (rad, at one place) in each log.
+    """A force that repeats along the track in each log, with another phase in each."""
 
-    units: of the axis, by which N and m are to be read.
-    """
-
-    period: float
-    amplitude: Mapping[str, float]
-    phase: Mapping[str, float]
-    units: AxisUnits = LINEAR
+    period: Number
+    amplitude: Mapping[str, Number]
+    """By log."""
+    phase: Mapping[str, Number]
+    """By log, at one place."""
+    unit: str = LINEAR.force
+    period_unit: str = LINEAR.position
+    phase_unit: str = "rad"
 
     @property
     def general(self) -> bool:
@@ -219,7 +219,8 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
         period,
         {n: float(abs(z)) for n, z in terms.items()},
         {n: float(np.angle(z)) for n, z in terms.items()},
-        dataset.units,
+        dataset.units.force,
+        dataset.units.position,
     )
     return None if found.general else found
 

@@ -17,6 +17,7 @@ from twin.logs.log import AxisLog
 from twin.model.machine import MachineModel
 from twin.model.units import AxisUnits
 from twin.parallel import Progress, silent
+from twin.record import Number, record
 from twin.simulation.follow import replay
 from twin.simulation.loop import Controller
 from twin.simulation.simulators import quickest
@@ -31,15 +32,14 @@ class Shown:
     loop: Loop | None
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Bias:
-    """That a mass, kg, is not what the response shows; None: it shows none.
+    """That a mass, kg, is not what the response shows."""
 
-    own: the model's, whose simulation is shown. Without one that of least squares with friction.
-    """
-
-    own: float
+    own: Number
+    """The model's, whose simulation is shown. Without one that of least squares with friction."""
     back: Banded | None
+    """What the response shows of it; null: it shows none."""
 
 
 @dataclass(frozen=True, eq=False)

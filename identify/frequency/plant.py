@@ -21,6 +21,7 @@ import numpy as np
 from identify.frequency.response import Complex, Response
 from identify.rules import RULE
 from twin.errors import InputError
+from twin.record import Number, record
 from twin.signals import Array
 
 SURE = NormalDist().inv_cdf(0.95)  # standard deviations to each side, of a 90 % band
@@ -29,15 +30,15 @@ LOUD = 3.0  # standard deviations from which an error counts less: what is not l
 DAMPING = (1e-4, 0.005, 0.05, 0.3)  # of a mode: least, two at which it is sought, and most
 
 
-@dataclass(frozen=True)
+@record
 class Banded:
     """A value and half its 90 % band, both in its unit."""
 
-    value: float
-    band: float
+    value: Number
+    band: Number
 
 
-@dataclass(frozen=True)
+@record
 class Mode:
     """A resonance: its frequency Hz, damping ratio, and part of the response beside the mass's."""
 

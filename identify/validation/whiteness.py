@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.prepared_log import PreparedLog, split_by_log
+from twin.record import Flags, Number, Values, computed, record
 from twin.signals import Array
 
 NORMAL = NormalDist()
@@ -32,30 +33,35 @@ class Feedback(Enum):
     UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Correlation:
-    """Correlation of the residual with a signal: lag (k,) s, positive where the signal was earlier.
-
-    value (k,): -1..1; tested (k,): which lags a right model must keep small; bound: of 90 % of a
-    white residual's values; limit: of all tested ones in 99 of 100 white residuals.
-    """
+    """Correlation (k,) of the residual with a signal, by lag; positive: the signal was earlier."""
 
     signal: str
-    lag: Array
-    value: Array
-    tested: NDArray[np.bool_]
-    bound: float
-    limit: float
+    lag: Values
+    value: Values
+    """-1..1"""
+    tested: Flags
+    """Which lags a right model must keep small."""
+    bound_90: Number
+    """Of 90 % of a white residual's values."""
+    limit_all_99: Number
+    """Of all tested ones in 99 of 100 white residuals."""
+    lag_unit: str = "s"
 
-    @property
-    def outside(self) -> float:
+    @computed
+    def share_outside(self) -> Number:
         """Part of the tested values beyond the bound; 0.1 is expected of a white residual."""
-        return float(np.mean(np.abs(self.value[self.tested]) > self.bound))
+        return float(np.mean(np.abs(self._tried) > self.bound_90))
+
+    @computed
+    def passed(self) -> bool:
+        """Whether no tested value is beyond the limit."""
+        return bool(np.all(np.abs(self._tried) < self.limit_all_99))
 
     @property
-    def passes(self) -> bool:
-        """Whether no tested value is beyond the limit."""
-        return bool(np.all(np.abs(self.value[self.tested]) < self.limit))
+    def _tried(self) -> Array:
+        return np.asarray(self.value)[np.asarray(self.tested)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +83,7 @@ class ResidualTests:
     @property
     def passes(self) -> bool:
         """Whether the residual is white and uncorrelated with command and speed."""
-        return all(c.passes for c in self.correlations)
+        return all(c.passed for c in self.correlations)
 
 
 def loop_of(logs: Sequence[PreparedLog]) -> Feedback:
@@ -153,8 +159,8 @@ def correlation(
         lag=np.asarray(spacing * lags, float),
         value=np.asarray(products / max(power, 1e-300)),
         tested=tested,
-        bound=float(NORMAL.inv_cdf(0.5 + WITHIN / 2.0) / root),
-        limit=float(NORMAL.inv_cdf(1.0 - (1.0 - sure) / 2.0 / count) / root),
+        bound_90=float(NORMAL.inv_cdf(0.5 + WITHIN / 2.0) / root),
+        limit_all_99=float(NORMAL.inv_cdf(1.0 - (1.0 - sure) / 2.0 / count) / root),
     )
 
 

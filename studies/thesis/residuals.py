@@ -57,7 +57,8 @@ def run(small: bool, rng: np.random.Generator) -> Found:
         "noise_floor": found.final.floor, "unit": "N",
         "white": {name: one.passes for name, one in tests.items()},
         "outside_90_bounds": {
-            name: {c.signal: c.outside for c in one.correlations} for name, one in tests.items()
+            name: {c.signal: c.share_outside for c in one.correlations}
+            for name, one in tests.items()
         },
         "parameters": beside_planted(planted, found.final.axis),
     }  # fmt: skip

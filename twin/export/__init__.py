@@ -17,13 +17,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from twin.errors import InputError, near
+from twin.record import record
 
 if TYPE_CHECKING:
     from twin.logs import Log
     from twin.model.machine import MachineModel
 
 
-@dataclass(frozen=True)
+@record
 class Remark:
     """What a format makes of a part of the model that it cannot hold as it is."""
 
@@ -180,7 +181,7 @@ def _templates() -> Any:
     return found
 
 
-@dataclass(frozen=True)
+@record
 class Outdated:
     """A file that is not as the model gives it now."""
 

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from identify.dataset.dataset import Role
 from identify.estimation.confounded import Refit
-from identify.estimation.residual_dependence import Dependence
+from identify.estimation.found_shape import FoundShape, FreeExponent
+from identify.estimation.residual_dependence import Dependence, Repeat
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
 from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
@@ -33,7 +34,6 @@ from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Confirmation, FindingKind
 from identify.selection.roles import RoleDependent
 from identify.validation.misfit_maps import Region
-from twin.curve import Coordinate
 from twin.knee import Imitated
 from twin.model.file import format_model
 
@@ -179,35 +179,6 @@ def _step(d: AxisDiagnosis, index: int) -> StepEntry:
 # --- findings --------------------------------------------------------------------------------
 
 
-class BendEntry(Entry):
-    """A parameter that a law holds, and the value that the logs ask for in its place."""
-
-    parameter: str
-    held: Number
-    found: Number
-    unit: str
-
-
-class CurveEntry(Entry):
-    """The curve that a law assumes, the one found, and the half width of its 90 % band."""
-
-    assumed: list[Number]
-    found: list[Number]
-    band_90: list[Number] = read("band")
-
-
-class ShapeEntry(Entry):
-    """The curve of a law as it is assumed and as it is found, by direction."""
-
-    over: Coordinate
-    coordinate: list[Number]
-    coordinate_unit: str = read("unit")
-    period: Number
-    unit: str = read("force_unit")
-    lets_go_at_standstill: bool = read("lets_go")
-    curves: dict[str, CurveEntry]
-
-
 class FindingEntry(Entry):
     """An effect that is missing, or of another shape, and what shows it."""
 
@@ -222,7 +193,7 @@ class FindingEntry(Entry):
     parameter_units: dict[str, str]
     together: list[str]
     """Effects without which the logs do not prove it."""
-    bend: BendEntry | None
+    bend: FreeExponent | None
     imitated: Imitated | None
     """What its law is on this motion, where no more than that is proved."""
     indistinguishable_from: list[str] = read("tied")
@@ -235,7 +206,7 @@ class FindingEntry(Entry):
     t: Number = read("score.t")
     control: Number = read("score.control")
     """The part that the same force shifted in time stays below, 19 of 20 times."""
-    shape: ShapeEntry | None
+    shape: FoundShape | None
 
 
 class RemainderEntry(Entry):
@@ -250,17 +221,6 @@ class RemainderEntry(Entry):
     unit: str
     where: Region | None
     advice: str
-
-
-class RepeatEntry(Entry):
-    """A force that repeats along the track in each log, with another phase in each."""
-
-    period: Number
-    period_unit: str = read("units.position")
-    amplitude: dict[str, Number]
-    unit: str = read("units.force")
-    phase: dict[str, Number]
-    phase_unit: str = "rad"
 
 
 def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None:
@@ -292,7 +252,7 @@ class DiagnosisEntry(Entry):
     depends_on_roles: list[RoleDependent] = read("by_roles")
     unexplained: Dependence | None
     remainder: RemainderEntry | None
-    repeats_not_general: RepeatEntry | None = read("repeat")
+    repeats_not_general: Repeat | None = read("repeat")
     ranking: list[CandidateEntry]
     steps: list[StepEntry]
     force_error: Number = read("base.error")

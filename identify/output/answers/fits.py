@@ -22,6 +22,7 @@ from identify.results.results import Comparison, Feedforward, FitResult, Simulat
 from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
 from identify.validation.tracking import AxisTracking
+from identify.validation.whiteness import Correlation
 
 # --- fits ------------------------------------------------------------------------------------
 
@@ -269,19 +270,6 @@ class HistogramEntry(Entry):
     share_within_90: Number = read("within")
 
 
-class CorrelationEntry(Entry):
-    """The correlation of the force residual with a signal, by lag."""
-
-    lag: list[Number]
-    lag_unit: str = "s"
-    value: list[Number]
-    tested: list[bool]
-    bound_90: Number = read("bound")
-    limit_all_99: Number = read("limit")
-    share_outside: Number = read("outside")
-    passed: bool = read("passes")
-
-
 class ResidualTestsEntry(Entry):
     """Whether the force residual is noise."""
 
@@ -291,7 +279,7 @@ class ResidualTestsEntry(Entry):
     samples: int
     passed: bool = read("passes")
     histogram: HistogramEntry
-    correlations: dict[str, CorrelationEntry]
+    correlations: dict[str, Correlation]
 
 
 class ComparisonEntry(Entry):

@@ -4,35 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from identify.frequency.of_logs import AxisFrequency, Shown
+from identify.frequency.of_logs import AxisFrequency, Bias, Shown
+from identify.frequency.plant import Banded, Mode
 from identify.output.answers import Answer, Entry, Number, answer_of
 from identify.results.frequency import FrequencyResponse
-
-
-class BandedEntry(Entry):
-    """A value and half its 90 % band."""
-
-    value: Number
-    band: Number
-
-
-class ModeEntry(Entry):
-    """A resonance: Hz, damping ratio, and its part of the response beside the mass's."""
-
-    frequency: BandedEntry
-    damping: BandedEntry
-    gain: BandedEntry
 
 
 class PlantEntry(Entry):
     """What a response shows, in SI units; delay in s."""
 
-    mass: BandedEntry
+    mass: Banded
     mass_unit: str
-    damping: BandedEntry
-    stiffness: BandedEntry
-    delay: BandedEntry
-    modes: list[ModeEntry]
+    damping: Banded
+    stiffness: Banded
+    delay: Banded
+    modes: list[Mode]
     misfit: Number
 
 
@@ -61,13 +47,6 @@ class ShownEntry(Entry):
     loop: LoopEntry | None
 
 
-class BiasEntry(Entry):
-    """The model's own mass, else that of least squares, and what the response shows of it."""
-
-    own: Number
-    back: BandedEntry | None
-
-
 class AxisFrequencyEntry(Entry):
     """One axis as the logs show it, and as the model in their place does.
 
@@ -76,7 +55,7 @@ class AxisFrequencyEntry(Entry):
 
     measured: ShownEntry
     modelled: ShownEntry | None
-    bias: BiasEntry | None
+    bias: Bias | None
 
 
 class FrequencyAnswer(Answer):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, field_validator
 
 from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, read
+from twin.export import Outdated, Remark
 
 if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
     from twin.checks.long import AxisInfo, LogInfo
@@ -274,33 +275,16 @@ class NewModelAnswer(Answer):
     not_determined: dict[str, list[str]]
 
 
-class RemarkEntry(Entry):
-    """What a format makes of a part of an axis that it cannot hold as it is."""
-
-    axis: str
-    part: str
-    text: str
-
-
 class ExportAnswer(Answer):
     """What `twin export` prints: the files, and by axis what they hold as the model does."""
 
     format: str
     files: list[File]
     kept: dict[str, list[str]]
-    approximated: list[RemarkEntry]
-    lost: list[RemarkEntry]
-    written: list[RemarkEntry]
+    approximated: list[Remark]
+    lost: list[Remark]
+    written: list[Remark]
     """What of a file that is written back is another now, and what stays beside the model."""
-
-
-class OutdatedEntry(Entry):
-    """A file that is not as the model gives it now: the first line that differs."""
-
-    file: File
-    line: int | None
-    has: str
-    gives: str
 
 
 class ExportAgreementAnswer(Answer):
@@ -308,7 +292,7 @@ class ExportAgreementAnswer(Answer):
 
     agrees: bool
     formats: list[str]
-    outdated: list[OutdatedEntry]
+    outdated: list[Outdated]
     a: File
     b: File
 

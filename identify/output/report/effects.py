@@ -108,8 +108,9 @@ def law_shapes(view: AxisView) -> list[Block]:
 def shape_charts(shape: FoundShape) -> list[Chart]:
     """The curve assumed beside the curve found, a chart for each direction."""
     curves = shape.curves.values()
-    scale = DisplayUnit.of(shape.force_unit, [(c.found, c.assumed) for c in curves])
-    along, words = DisplayUnit.of(shape.unit, shape.coordinate), units_of(shape.force_unit).words
+    scale = DisplayUnit.of(shape.unit, [(c.found, c.assumed) for c in curves])
+    along = DisplayUnit.of(shape.coordinate_unit, shape.coordinate)
+    words = units_of(shape.unit).words
     within = " within one period" if shape.period is not None else ""
     label = along.label(words(f"{shape.over.value}{within}").capitalize())
     return [
@@ -117,8 +118,8 @@ def shape_charts(shape: FoundShape) -> list[Chart]:
             (label, along(shape.coordinate)),
             scale.label(words(f"Force of the law, {direction}")),
             [
-                Drawn("90 % band", scale(curve.found - curve.band), Line.BAND),
-                Drawn("90 % band", scale(curve.found + curve.band), Line.BAND),
+                Drawn("90 % band", scale(curve.found - curve.band_90), Line.BAND),
+                Drawn("90 % band", scale(curve.found + curve.band_90), Line.BAND),
                 Drawn("found in the logs", scale(curve.found)),
                 Drawn("assumed by the law", scale(curve.assumed), Line.DASH, Ink.INK),
             ],

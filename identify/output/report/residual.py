@@ -143,7 +143,7 @@ def _histogram(tests: ResidualTests, units: AxisUnits) -> Chart:
 
 def _correlation(test: Correlation) -> Chart:
     scale, own = DisplayUnit.of("s", test.lag), test.signal == "residual"
-    bound = np.full(len(test.lag), test.bound)
+    bound = np.full(len(test.lag), test.bound_90)
     lines = [
         Drawn("tested", np.where(test.tested, test.value, np.nan), Line.STEMS),
         Drawn("not tested", np.where(test.tested, np.nan, test.value), Line.STEMS, Ink.SOFT),

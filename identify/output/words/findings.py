@@ -103,8 +103,8 @@ def pairs_in_words(found: AxisDiagnosis) -> list[str]:
 
 def shape_in_words(effect: str, shape: FoundShape) -> str:
     """Where a law surely differs most from the curve found, and what that does at standstill."""
-    words = units_of(shape.force_unit).words
-    sure = {name: np.abs(c.found - c.assumed) - c.band for name, c in shape.curves.items()}
+    words = units_of(shape.unit).words
+    sure = {name: np.abs(c.found - c.assumed) - c.band_90 for name, c in shape.curves.items()}
     direction = max(sure, key=lambda name: np.nanmax(sure[name]))
     if not shape.differs:
         return words(
@@ -112,12 +112,12 @@ def shape_in_words(effect: str, shape: FoundShape) -> str:
             "more than its 90 % band."
         )
     curve, at = shape.curves[direction], int(np.nanargmax(sure[direction]))
-    values = [float(v[at]) for v in (curve.assumed, curve.found, curve.band)]
-    scale = DisplayUnit.of(shape.force_unit, values)
+    values = [float(v[at]) for v in (curve.assumed, curve.found, curve.band_90)]
+    scale = DisplayUnit.of(shape.unit, values)
     assumed, found, band = (number(v / scale.size) for v in values)
-    place = quantity(float(shape.coordinate[at]), shape.unit)
+    place = quantity(float(shape.coordinate[at]), shape.coordinate_unit)
     within = "" if shape.period is None else " of its period"
-    rest = " The force is gone at standstill." if shape.lets_go else ""
+    rest = " The force is gone at standstill." if shape.lets_go_at_standstill else ""
     return words(
         f"The law of {effect} is off most at {shape.over.value} {place}{within}, {direction}: it "
         f"assumes {assumed}, the logs show {found} ± {band} {scale.unit}.{rest}"

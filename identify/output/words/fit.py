@@ -385,11 +385,11 @@ def dependence_in_words(dependence: Dependence) -> str:
 
 def repeat_in_words(repeat: Repeat) -> str:
     """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
-    units, words = repeat.units, repeat.units.words
-    sizes = ", ".join(f"{quantity(a, units.force)} in {n}" for n, a in repeat.amplitude.items())
+    words = units_of(repeat.unit).words
+    sizes = ", ".join(f"{quantity(a, repeat.unit)} in {n}" for n, a in repeat.amplitude.items())
     turns = np.degrees(np.ptp(np.unwrap(list(repeat.phase.values()))))
     return (
-        f"a {words('force')} repeats every {quantity(repeat.period, units.position)} of travel "
+        f"a {words('force')} repeats every {quantity(repeat.period, repeat.period_unit)} of travel "
         f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: it is present "
         f"in each log, but no function of {words('position')} holds for all of them, so no effect "
         "is named"
@@ -420,10 +420,10 @@ def correlation_in_words(correlation: Correlation) -> str:
     if correlation.signal != "residual":
         what = f"correlation of the force residual with {correlation.signal}"
     said = (
-        f"{what}: {percent(correlation.outside)} of the lags exceed the 90 % bounds of "
-        f"±{correlation.bound:.2g} (noise alone: 10 %)"
+        f"{what}: {percent(correlation.share_outside)} of the lags exceed the 90 % bounds of "
+        f"±{correlation.bound_90:.2g} (noise alone: 10 %)"
     )
-    reach = f"exceeds ±{correlation.limit:.2g}, the most that noise reaches"
-    if correlation.passes:
+    reach = f"exceeds ±{correlation.limit_all_99:.2g}, the most that noise reaches"
+    if correlation.passed:
         return f"{said}, none {reach}"
     return f"{said}, and the largest {reach}: the residual is not noise"

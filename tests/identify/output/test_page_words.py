@@ -90,8 +90,14 @@ def test_an_interval_has_two_digits_of_its_half_width(unit, ends, values, printe
     [
         ({"low": 0.0, "high": 1.5}, "moving forwards"),
         ({"low": -1.5, "high": 0.0}, "moving backwards"),
-        ({"coordinate": "standstill", "coordinate_unit": "1", "low": 0.0, "high": 1.0}, "in motion"),
-        ({"coordinate": "standstill", "coordinate_unit": "1", "low": 1.0, "high": 2.0}, "at standstill"),
+        (
+            {"coordinate": "standstill", "low": 0.0, "high": 1.0},
+            "in motion",
+        ),
+        (
+            {"coordinate": "standstill", "low": 1.0, "high": 2.0},
+            "at standstill",
+        ),
         (
             {"coordinate": "position", "coordinate_unit": "m", "low": 0.01131, "high": 0.01157},
             "position between 11.31 and 11.57 mm",

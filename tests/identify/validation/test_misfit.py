@@ -248,18 +248,18 @@ def test_of_a_white_residual_a_tenth_leaves_the_bounds_and_nearly_all_pass():
             (white, white if name == "residual" else c) for white, c in map(drawn, range(60))
         )
         tests = [correlation(name, [a], [b], SPACING, Feedback.CLOSED) for a, b in drawings]
-        assert np.mean([t.outside for t in tests]) == pytest.approx(0.1, abs=0.03)
-        assert np.mean([t.passes for t in tests]) > 0.94
-        assert tests[0].bound == pytest.approx(1.645 / np.sqrt(N), rel=1e-3)
+        assert np.mean([t.share_outside for t in tests]) == pytest.approx(0.1, abs=0.03)
+        assert np.mean([t.passed for t in tests]) > 0.94
+        assert tests[0].bound_90 == pytest.approx(1.645 / np.sqrt(N), rel=1e-3)
 
 
 def test_what_feedback_does_to_the_command_is_no_fault_of_the_model():
     """A command that answers the residual comes after it: not tested where the loop is closed."""
     white, _ = drawn(3)
     answer = -0.5 * np.roll(white, 4) + drawn(4)[0]
-    assert correlation("command", [white], [answer], SPACING, Feedback.CLOSED).passes
+    assert correlation("command", [white], [answer], SPACING, Feedback.CLOSED).passed
     opened = correlation("command", [white], [answer], SPACING, Feedback.OPEN)
-    assert not opened.passes
+    assert not opened.passed
     assert opened.lag[np.argmax(np.abs(opened.value))] == pytest.approx(-4 * SPACING)
 
 
@@ -271,8 +271,8 @@ def test_gaps_and_the_seams_between_logs_do_not_count():
         "command", [holed, white[:300]], [command, command[:300]], SPACING, Feedback.OPEN
     )
     assert np.isfinite(test.value).all()
-    assert test.passes
-    assert test.bound == pytest.approx(1.645 / np.sqrt(N - 500 + 300), rel=1e-3)
+    assert test.passed
+    assert test.bound_90 == pytest.approx(1.645 / np.sqrt(N - 500 + 300), rel=1e-3)
 
 
 @pytest.mark.slow
@@ -293,7 +293,7 @@ def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
     assert found.within == pytest.approx(0.9, abs=0.06)
     assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0, abs=0.02)
     poor = tested(STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab")))
-    assert not any(c.passes for c in poor.correlations)
+    assert not any(c.passed for c in poor.correlations)
     assert poor.within < 0.3
 
 

@@ -73,7 +73,7 @@ def test_the_fits_of_the_drive_and_of_its_twin_agree(model, fitted, record) -> N
     twin = identified(model, followed(fitted, *record("DATA_EMPS")), WINDOW)
     assert_agree(fitted, twin)
     found = agree(fitted, twin).axes["x"]
-    assert len(found.differences) >= 4
+    assert len(found.parameters.values()) >= 4
     assert found.of_wrong_models  # of the drive; nothing of the catalogue reaches its noise floor
 
 
