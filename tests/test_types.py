@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-CHECK = (sys.executable, "-m", "pyrefly", "check", "--min-severity", "error", "--config")
+CHECK = (
+    sys.executable, "-m", "pyrefly", "check", "--min-severity", "error",
+    "--python-interpreter-path", sys.executable, "--config",
+)  # fmt: skip
 
 
 def check(*files: Path) -> subprocess.CompletedProcess[str]:
