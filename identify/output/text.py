@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
+from identify.output.candidates import line_of, row_of
 from identify.output.numbers import (
     DisplayUnit,
     arrow,
     by_how_much,
-    change,
     listed,
     number,
     quantity,
 )
-from identify.output.words.diagnosis import said_of, tested_on, why_not
+from identify.output.words.diagnosis import said_of, tested_on
 from identify.output.words.fit import (
     LOOPS,
     agreement_in_words,
@@ -60,7 +60,6 @@ from identify.results.results import (
     SimulationFit,
     refitted,
 )
-from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.nonparametric import nonparametric_labels
 from identify.validation.agreement import Agreement
@@ -197,16 +196,7 @@ def _candidates(found: AxisDiagnosis) -> Iterator[str]:
     shown = found.ranking[:SHOWN]
     if any(c.score for c in shown):
         yield f"  candidates with their evidence (difference of BIC) and the {tested_on(found)}"
-    yield from (_candidate(c, found) for c in shown)
-
-
-def _candidate(c: Candidate, found: AxisDiagnosis) -> str:
-    why = why_not(found, c)
-    if c.score is None:
-        return f"  {c.effect.name:28s} not refitted: {why}"
-    scale = DisplayUnit.of(c.fit.axis.units.force, c.gain.before)
-    errors = " -> ".join(change(c.gain.before, c.gain.after, scale))
-    return f"  {c.effect.name:28s} {c.delta_bic:10.1f}   {errors}   {why}".rstrip()
+    yield from (f"  {line_of(row_of(c, found))}" for c in shown)
 
 
 @text_of.register

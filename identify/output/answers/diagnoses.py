@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -10,7 +11,7 @@ from identify.dataset.dataset import Role
 from identify.estimation.confounded import Refit
 from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.estimation.residual_dependence import Dependence, Repeat
-from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, answer_of, read
+from identify.output.answers import LOWER, Answer, Entry, File, Number, answer_of, read
 from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
     EstimateEntry,
@@ -19,12 +20,12 @@ from identify.output.answers.fits import (
     estimate_entries,
 )
 from identify.output.answers.plans import PlanAnswer
+from identify.output.candidates import CandidateRow, row_of
 from identify.output.words.diagnosis import (
     advice,
     model_change_in_words,
     not_named_in_words,
     said_of,
-    why_not,
 )
 from identify.output.words.findings import pairs_in_words
 from identify.results.grown import Addition, AllAdded, Removal
@@ -36,6 +37,7 @@ from identify.selection.roles import RoleDependent
 from identify.validation.misfit_maps import Region
 from twin.knee import Imitated
 from twin.model.file import format_model
+from twin.record import record
 
 
 class ValuesEntry(Entry):
@@ -136,44 +138,23 @@ def _(result: AllAdded, **more: Any) -> AllAddedAnswer:
     return AllAddedAnswer.of(result, steps=steps, **more)
 
 
-class CandidateEntry(ValuesEntry):
-    """An effect that was tried beside the model."""
-
-    delta_bic: Number
-    holdout_error_before: Number = read("gain.before")
-    holdout_error_after: Number = read("gain.after")
-    unit: str = read("fit.axis.units.force")
-    supported: bool
-    part: Number
-    why_not: Told
-
-
-class StepEntry(CandidateEntry):
+@record
+class StepRow(CandidateRow):
     """A change of the model that was accepted on the way to the answer."""
 
     change: str
-    dropped: list[str]
+    dropped: tuple[str, ...]
     with_others: bool
     not_named: str | None
 
 
-def _candidate(c: Candidate, d: AxisDiagnosis) -> dict[str, Any]:
-    return {
-        "effect": c.effect.name,
-        "delta_bic": c.delta_bic if c.score else None,
-        "why_not": why_not(d, c),
-        **_values(c),
-    }
-
-
-def _step(d: AxisDiagnosis, index: int) -> StepEntry:
-    step, candidate = d.steps[index], d.steps[index].tried.candidate
-    told = _candidate(candidate, d) | {
-        "effect": step.change.name,
-        "change": model_change_in_words(step.change),
-        "not_named": not_named_in_words(d, index),
-    }
-    return StepEntry.of(step, candidate, **told)
+def _step(d: AxisDiagnosis, index: int) -> StepRow:
+    step = d.steps[index]
+    row = replace(row_of(step.tried.candidate, d), effect=step.change.name)
+    return StepRow(
+        **vars(row), change=model_change_in_words(step.change), dropped=step.dropped,
+        with_others=step.with_others, not_named=not_named_in_words(d, index),
+    )  # fmt: skip
 
 
 # --- findings --------------------------------------------------------------------------------
@@ -253,8 +234,8 @@ class DiagnosisEntry(Entry):
     unexplained: Dependence | None
     remainder: RemainderEntry | None
     repeats_not_general: Repeat | None = read("repeat")
-    ranking: list[CandidateEntry]
-    steps: list[StepEntry]
+    ranking: list[CandidateRow]
+    steps: list[StepRow]
     force_error: Number = read("base.error")
     force_error_with_found: Number = read("final.error")
     noise_floor: Number = read("floor")
@@ -325,7 +306,7 @@ def _diagnosis(result: Diagnosis, axis: str) -> DiagnosisEntry:
         effect=d.best.effect.name if d.best else None,
         needed_together=pairs_in_words(d),
         remainder=_remainder(d, result.left_over.get(axis)),
-        ranking=[CandidateEntry.of(c, **_candidate(c, d)) for c in d.ranking],
+        ranking=[row_of(c, d) for c in d.ranking],
         steps=[_step(d, i) for i in range(len(d.steps))],
         parameters=estimate_entries(summary.after),
         refit=result.refits.get(axis),

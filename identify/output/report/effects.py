@@ -8,11 +8,11 @@ from dataclasses import replace
 from identify.dataset.dataset import Role
 from identify.estimation.found_shape import FoundShape
 from identify.estimation.intervals import Estimate, ModelWrong
+from identify.output.candidates import CandidateRow, columns_of, row_of, values_in_words
 from identify.output.numbers import (
     NOTHING,
     DisplayUnit,
     capitalised,
-    number,
     percent,
     quantity,
     spaced,
@@ -32,7 +32,7 @@ from identify.output.report.page import (
     Tone,
 )
 from identify.output.report.subject import AxisView, Subject
-from identify.output.words.diagnosis import tested_on, why_not
+from identify.output.words.diagnosis import tested_on
 from identify.output.words.findings import shape_in_words
 from identify.output.words.fit import (
     common_reason,
@@ -50,8 +50,6 @@ from twin.effect import Effect
 from twin.model.machine import AxisModel, HistoryStep
 from twin.model.parameters import all_parameters, read
 from twin.model.units import units_of
-
-UNBROKEN = "\u00a0"  # space at which no line ends
 
 # --- what each effect explains ---------------------------------------------------------------
 
@@ -145,37 +143,23 @@ def ranking(view: AxisView) -> list[Block]:
 
 def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> TableBlock:
     """Evidence, errors, and why a candidate is not proved."""
-    units = found.dataset.units
-    scale = DisplayUnit.of(units.force, [c.gain.before for c in refitted])
-    told = [c.effect.name for c in refitted[:3]]  # with their values
-    columns: dict[str, Callable[[Candidate], str]] = {
-        "Effect": lambda c: title_case(c.effect.name),
-        "Evidence (ΔBIC)": lambda c: number(c.delta_bic),
-        "Error before": lambda c: scale.text(c.gain.before),
-        "Error after": lambda c: scale.text(c.gain.after),
-        "Part removed": lambda c: percent(max(c.part, 0.0)),
-        "Why not": lambda c: spaced(why_not(found, c)),
-        "Values": lambda c: values_of(c.effect, c.fit.axis) if c.effect.name in told else "",
-    }
+    rows = [row_of(c, found) for c in refitted]
+    told = 3  # with their values
+    rows = [*rows[:told], *(replace(row, parameters={}) for row in rows[told:])]
+    best = found.best.effect.name if found.best else ""
     caption = (
         f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
         f"BIC. Error: RMS force, {tested_on(found)}. Part removed: of the squared error above the "
         "noise floor, on the training logs or on data left out of the fit, whichever is less."
     )
 
-    def tone(c: Candidate) -> Tone:
-        return Tone.STRONG if c is found.best else Tone.PLAIN if c.supported else Tone.MUTED
+    def tone(row: CandidateRow) -> Tone:
+        return Tone.STRONG if row.effect == best else Tone.PLAIN if row.supported else Tone.MUTED
 
     return TableBlock.of(
-        refitted, columns, units.words(caption), tone, lambda c: min(max(c.part, 0.0), 1.0)
-    )
-
-
-def values_of(effect: Effect, model: AxisModel) -> str:
-    """The values of an effect's parameters in a model, with units."""
-    units = model.parameter_units(effect.name)
-    texts = (f"{n} = {quantity(v, units[n])}" for n, v in model[effect.name].values.items())
-    return ", ".join(t.replace(" ", UNBROKEN) for t in texts)
+        rows, columns_of(rows), found.dataset.units.words(caption), tone,
+        lambda row: min(max(row.part, 0.0), 1.0),
+    )  # fmt: skip
 
 
 # --- the error, effect by effect -------------------------------------------------------------
@@ -243,7 +227,10 @@ def equations(view: AxisView) -> list[Block]:
             ("What it is", effect.summary),
             ("Fingerprint", effect.fingerprint),
             ("Excited by", effect.excited_by),
-            ("Fitted", values_of(effect, model)),
+            (
+                "Fitted",
+                values_in_words(model[effect.name].values, model.parameter_units(effect.name)),
+            ),
             ("Source", effect.source),
         )
         heading = Heading(f"{title_case(effect.name)} on {view.name}")
