@@ -25,6 +25,7 @@ from identify.estimation.residual_noise import with_own_noise
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.findings import Confirmation, Finding, findings_of, without_law
+from identify.selection.roles import with_turns
 from identify.selection.search import Found, on_final_dataset, resumed, search
 from identify.selection.ties import with_ties
 from twin.effects import Catalogue
@@ -122,7 +123,7 @@ def laws_of(found: Found) -> frozenset[str]:
 def _explained(found: Found) -> Conclusion:
     """What each finding explains, with what is left at the end as noise where it is."""
     ended = _with_own_noise(found)
-    return Conclusion(ended, findings_of(ended))
+    return Conclusion(ended, with_turns(ended, findings_of(ended)))
 
 
 def _weakest(ended: Conclusion, found: Found) -> Finding | None:

@@ -38,9 +38,26 @@ def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDepen
     turns = found.dataset.part.exchanged
     if not turns or (found.final.at_floor and not findings):
         return ()
-    axis = found.final.fit.axis
-    finals = [refitted_on(axis, Judged(found.final.fit, dataset)) for dataset in turns]
-    return (*_lost(found, findings, finals), *_gained(found))
+    finals = _in_turn(found)
+    return (*_lost(found, findings, finals), *_unsure(findings), *_gained(found))
+
+
+def with_turns(found: Found, findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings, with those marked that all other logs prove in turn where these are unsure.
+
+    All logs testify: which of them chooses is no property of the machine.
+    """
+    asked = [f for f in findings if f.is_unsure]
+    finals = _in_turn(found) if asked else []
+    scores = {f.effect: _scores(found, f, finals) for f in asked}
+    proved = {effect for effect, each in scores.items() if each and all(map(_proved, each))}
+    return tuple(replace(f, in_turn=f.effect in proved) for f in findings)
+
+
+def _in_turn(found: Found) -> list[Judged]:
+    """All that was found, fitted where other logs choose; of long logs by their beginnings."""
+    axis, fit = found.final.fit.axis, found.final.fit
+    return [refitted_on(axis, Judged(fit, dataset)) for dataset in found.dataset.part.exchanged]
 
 
 def with_exchanged(
@@ -55,20 +72,32 @@ def _lost(
     found: Found, findings: Sequence[Finding], finals: Sequence[Judged]
 ) -> Iterator[RoleDependent]:
     """Of the findings those that are not proved where other logs choose."""
-    base = found.base.fit.axis
     for finding in findings:
-        steps = [s for s in found.steps if s.change.name == finding.effect]
-        if any(s.held or s.tried.candidate.is_noise for s in steps):
-            continue
-        scores = []
-        for final in finals:
-            axis = final.fit.axis
-            for step in reversed(steps):
-                axis = step.change.undone(axis, base) or axis
-            scores.append(score(refitted_on(axis, final), final))
-        if refused := [s for s in scores if not _proved(s)]:
+        if refused := [s for s in _scores(found, finding, finals) if not _proved(s)]:
             worst = min(refused, key=lambda s: s.t)
             yield RoleDependent(finding.effect, True, worst.part, worst.t)
+
+
+def _scores(found: Found, finding: Finding, finals: Sequence[Judged]) -> list[Score]:
+    """Of a law beside all others where other logs choose; none of one that they tell nothing of."""
+    base = found.base.fit.axis
+    steps = [s for s in found.steps if s.change.name == finding.effect]
+    if any(s.held or s.tried.candidate.is_noise for s in steps):
+        return []
+    scores = []
+    for final in finals:
+        axis = final.fit.axis
+        for step in reversed(steps):
+            axis = step.change.undone(axis, base) or axis
+        scores.append(score(refitted_on(axis, final), final))
+    return scores
+
+
+def _unsure(findings: Sequence[Finding]) -> Iterator[RoleDependent]:
+    """Of the findings those that other logs alone prove, choosing in turn."""
+    for f in findings:
+        if f.in_turn:
+            yield RoleDependent(f.effect, False, f.score.part, f.score.t)
 
 
 def _gained(found: Found) -> Iterator[RoleDependent]:
