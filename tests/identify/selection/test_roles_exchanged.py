@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from built_results import FOUND, score_of
 from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 
 from benchmarks.drives import CATALOGUE, HIDDEN
@@ -87,11 +90,32 @@ def test_other_logs_choose_in_turn_where_the_others_have_been() -> None:
     assert begun(SLIDE, logs, {})[1].exchanged == ()
 
 
+@pytest.mark.parametrize(
+    ("part", "t", "control", "unsure"),
+    [
+        (0.41, 0.7, 0.1, True),  # as large as it is elsewhere, in too short a log
+        (0.41, -0.7, 0.1, False),
+        (0.05, 0.7, 0.0, False),
+        (0.41, 0.7, 0.5, False),  # its force shifted in time takes as much
+    ],
+)
+def test_logs_that_are_unsure_alone_leave_a_law_to_all_others(part, t, control, unsure) -> None:
+    finding = replace(FOUND[0], score=score_of(part, t, control))
+    assert finding.refused
+    assert finding.is_unsure == unsure
+    assert replace(finding, in_turn=True).refused is None
+    wrong = replace(finding, in_turn=True, doubt="its period is longer than the travel")
+    assert wrong.refused == wrong.doubt
+    assert not wrong.is_unsure
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("hidden", ["nothing", "asymmetric_friction"])
-def test_three_logs_tell_the_same_whichever_of_them_chooses(hidden: str) -> None:
-    """One chose by itself; its answer was "unexplained", or lacked the shape of the bumps."""
-    found = of_machine(hidden, 54)
+@pytest.mark.parametrize(
+    ("hidden", "seed"), [("nothing", 54), ("asymmetric_friction", 54), ("dwell_stiction", 55)]
+)
+def test_three_logs_tell_the_same_whichever_of_them_chooses(hidden: str, seed: int) -> None:
+    """One chose by itself: its answer was "unexplained", lacked the bumps' shape, or a law."""
+    found = of_machine(hidden, seed)
     assert found["same"] or found["told"], found["answers"]
     assert all(["cable_slab"] in answer for answer in found["answers"])
 
