@@ -450,12 +450,14 @@ def _together(
 ) -> Array:
     """The change by sets (m, p) of the table's parameters in one walk; absent: from no force."""
     motion = _driven(group, log, axis)[0]
-    unmoved = 0.0 if absent else total_forces(table, table.parameters[None], motion)
+    every = sets if absent else np.concatenate([table.parameters[None], sets])
     # forces of several sets of parameters that are held until they are averaged
-    at_once = max(500_000 // motion.signals.shape[1], 1)
-    means = []
-    for i in range(0, len(sets), at_once):
-        forces = total_forces(table, sets[i : i + at_once], motion)
+    at_once = max(500_000 // motion.signals.shape[1], 2)
+    means, unmoved = [], 0.0
+    for i in range(0, len(every), at_once):
+        forces = total_forces(table, every[i : i + at_once], motion)
+        if not i and not absent:
+            unmoved, forces = forces[0], forces[1:]
         forces -= unmoved
         means.append(log.test_function.mean(forces))
     return np.concatenate(means)

@@ -72,13 +72,15 @@ class Score:
     """A change against the model without it, on the training logs and on logs not fitted to.
 
     control: the part that all but one in twenty of its controls stay below. among: of how many
-    changes it was chosen.
+    changes it was chosen. in_turn: whether all other logs, two or more, prove it, choosing in turn;
+    then it stands where those that choose see it too and are not sure of it alone.
     """
 
     training: Taken
     other: Taken
     control: float = 0.0
     among: int = 1
+    in_turn: bool = False
 
     @property
     def t(self) -> float:
@@ -96,8 +98,15 @@ class Score:
         return min(self.training.part, self.other.part)
 
     @property
+    def is_seen(self) -> bool:
+        """Whether it takes as much as a change is to take, sure or not."""
+        return self.part >= RULE.least_part and self.part > self.control and self.t > 0.0
+
+    @property
     def refused(self) -> str | None:
         """Why the change is not accepted, in words; None where it is."""
+        if self.in_turn and self.is_seen:
+            return None
         if self.part < RULE.least_part:
             return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
         for t, least in ((self.t, least_t(1)), (self.together, least_t(self.among))):

@@ -24,8 +24,7 @@ from identify.estimation.errors import Errors, error_in
 from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
-from identify.rules import RULE
-from identify.selection.acceptance import Judged, Score, least_t, score
+from identify.selection.acceptance import Judged, Score, score
 from identify.selection.candidates import NotItself, doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.of_bodies import is_of_bodies
@@ -128,8 +127,7 @@ class Finding:
     chose, and on the training logs. doubt: why
     its values cannot be its own, in words; None where they can. imitated: what its law is on this
     motion, where no more than that is proved. exchanged: part and t of its score with training and
-    selection logs exchanged, where it is not proved so; None where it is, or nobody asked. in_turn:
-    whether all other logs prove it, choosing in turn, where those that choose are unsure.
+    selection logs exchanged, where it is not proved so; None where it is, or nobody asked.
     """
 
     effect: str
@@ -150,7 +148,6 @@ class Finding:
     doubt: str | None = None
     imitated: Imitated | None = None
     exchanged: tuple[float, float] | None = None
-    in_turn: bool = False
     parameter_units: dict[str, str] = field(default_factory=dict)
     equation: str = ""
 
@@ -170,14 +167,7 @@ class Finding:
 
         It was chosen of many before; here it is asked alone.
         """
-        return self.doubt or (None if self.in_turn else replace(self.score, among=1).refused)
-
-    @property
-    def is_unsure(self) -> bool:
-        """Whether the logs that choose see as much as a law takes, and are not sure of it alone."""
-        s = self.score
-        large = s.part >= RULE.least_part and s.part > s.control
-        return not self.doubt and large and 0.0 < s.t < least_t(1)
+        return self.doubt or replace(self.score, among=1).refused
 
     @property
     def is_sure(self) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from identify.selection.acceptance import Judged, Score, score
 from identify.selection.findings import Finding
 from identify.selection.search import Found
-from identify.selection.trying import refitted_on
+from identify.selection.trying import FEWEST_TURNS, refitted_on
 from twin.record import Number, record
 
 
@@ -47,11 +47,18 @@ def with_turns(found: Found, findings: Sequence[Finding]) -> tuple[Finding, ...]
 
     All logs testify: which of them chooses is no property of the machine.
     """
-    asked = [f for f in findings if f.is_unsure]
+    asked = [f for f in findings if not f.doubt and f.refused and f.score.is_seen]
     finals = _in_turn(found) if asked else []
     scores = {f.effect: _scores(found, f, finals) for f in asked}
-    proved = {effect for effect, each in scores.items() if each and all(map(_proved, each))}
-    return tuple(replace(f, in_turn=f.effect in proved) for f in findings)
+    proved = {
+        effect
+        for effect, each in scores.items()
+        if len(each) >= FEWEST_TURNS and all(map(_proved, each))
+    }
+    return tuple(
+        replace(f, score=replace(f.score, in_turn=True)) if f.effect in proved else f
+        for f in findings
+    )
 
 
 def _in_turn(found: Found) -> list[Judged]:
@@ -96,7 +103,7 @@ def _scores(found: Found, finding: Finding, finals: Sequence[Judged]) -> list[Sc
 def _unsure(findings: Sequence[Finding]) -> Iterator[RoleDependent]:
     """Of the findings those that other logs alone prove, choosing in turn."""
     for f in findings:
-        if f.in_turn:
+        if f.score.in_turn:
             yield RoleDependent(f.effect, False, f.score.part, f.score.t)
 
 

@@ -5,6 +5,7 @@ Of all changes for the search; of a single one for whoever asks for it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -43,6 +44,7 @@ from twin.threads import trim_memory
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
+FEWEST_TURNS = 2  # other logs that prove a law: with those that choose most of all logs see it
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,8 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
 
     Fitted again for that: what it takes is to be seen either way, but a start that the one group of
     logs hides, the other may show. Whoever looks more often finds more by chance, so that each is
-    one of as many times the changes. Nothing is asked where a law was doubted at the end of a
+    one of as many times the changes. What all of two or more such logs prove stands where those
+    that choose see it too. Nothing is asked where a law was doubted at the end of a
     search, as its kin would be one after another; nor of a joint beside its bodies, which all of
     the logs chose.
     """
@@ -134,21 +137,26 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
     if own.beside_bodies or trial.barred or judged.at_floor:
         return []
     turns = own.exchanged
-
-    def as_they_are(t: Tried) -> Tried:
-        score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
-        among = (len(turns) + 1) * score.among if score else 1
-        return judged_change(judged, t.screening, fit, among)
-
     found: dict[str, Tried] = {}
+    proofs = Counter[str]()
     for dataset in turns:
         there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
         tried = tried_beside(there, trial, within(progress, "other logs choosing"))[1]
         proved = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
-        for t in proved:
-            if not t.candidate.is_noise and t.change.name not in found:
-                found[t.change.name] = as_they_are(t)
-    return [*found.values()]
+        known = {t.change.name: t for t in proved if not t.candidate.is_noise}
+        proofs.update(name for name, t in known.items() if t.candidate.supported)
+        found = known | found
+
+    def as_they_are(t: Tried) -> Tried:
+        score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
+        among = (len(turns) + 1) * score.among if score else 1
+        told = judged_change(judged, t.screening, fit, among)
+        score, proved = told.candidate.score, proofs[t.change.name]
+        if score is None or not FEWEST_TURNS <= proved == len(turns):
+            return told
+        return replace(told, candidate=replace(told.candidate, score=replace(score, in_turn=True)))
+
+    return [as_they_are(t) for t in found.values()]
 
 
 def may_be_itself(c: Candidate) -> bool:
