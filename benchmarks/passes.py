@@ -8,9 +8,12 @@ less that of `twin effects`, which starts as they do.
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import perf_counter
 
 import numpy as np
 
@@ -18,6 +21,7 @@ from benchmarks import workload
 from benchmarks.figures import Figure, Target
 from benchmarks.timing import Cost, first_line, twin
 from benchmarks.workload import MB, Workload, megabytes, saved
+from identify.workflow import fit
 from twin.logs import write_log
 from twin.simulation.simulate import simulate
 
@@ -30,7 +34,7 @@ def measure() -> list[Figure]:
     """The short commands, then fit and diagnosis in passes, then the demonstration."""
     work = workload.make()
     effects = _least("effects")
-    return [*_short(work, effects), *_long(work, effects), *_demo()]
+    return [*_short(work, effects), *_long(work, effects), _pool(work), *_demo()]
 
 
 def _least(*arguments: str | Path) -> Cost:
@@ -103,6 +107,34 @@ def _long(work: Workload, effects: Cost) -> list[Figure]:
         Figure("twin diagnose, its first answer", first, "s", Target(high=3.0), "wall time"),
         workload.memory("", found[0].cost, effects, work),
     ]  # fmt: skip
+
+
+FITS = 8  # in a row, and in a pool of two processes
+GIVEN: list[Workload] = []  # of this process; workers have it from the process that forked them
+
+
+def _fitted(number: int) -> dict[str, tuple[float, ...]]:
+    """The values of the axis, by effect, as one of the logs has them."""
+    work = GIVEN[0]
+    name, log = [*work.plain.items()][number % len(work.plain)]
+    axis = fit(work.model, {name: log}).fits[workload.AXIS].axis
+    return {"mass": (axis.mass,), **{f.effect.name: tuple(f.vector()) for f in axis.effects}}
+
+
+def _pool(work: Workload) -> Figure:
+    """Wall time of fits in a pool of two processes over that of the same in a row."""
+    GIVEN[:] = [work]
+    _fitted(0)  # whatever is loaded first
+    with ProcessPoolExecutor(2, get_context("fork")) as pool:
+        list(pool.map(_fitted, range(2)))
+        begun = perf_counter()
+        in_row = [_fitted(i) for i in range(FITS)]
+        between = perf_counter()
+        in_pool = [*pool.map(_fitted, range(FITS))]
+        ended = perf_counter()
+    same = "the same numbers" if in_pool == in_row else "OTHER NUMBERS"
+    spent = (ended - between) / (between - begun)
+    return Figure(f"{FITS} fits in a pool of two over in a row", spent, "1", Target(high=0.6), same)
 
 
 def _demo() -> list[Figure]:
