@@ -109,7 +109,8 @@ def _share(residual: Array, coordinate: Array, bins: int) -> float:
 
 def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
-    shares, lines = _shares(base.residual, *_where(base, dataset))
+    taken, lines = _shares(base.residual, *_where(base, dataset))
+    shares = {name: float(share) for name, share in taken.items()}
     name = _foremost(shares)
     unit = unit_of(name, dataset.training[0].motion)
     return Dependence(shares[name], name, lines.get(name), unit, shares)
