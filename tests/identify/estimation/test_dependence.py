@@ -235,6 +235,9 @@ def test_noise_is_part_of_the_floor_and_said():
     assert known.force_noise == pytest.approx(np.sqrt(fit.error**2 - fit.floor**2))
     assert fit_to(known).ratio == pytest.approx(1.0)
     assert "Its origin is not known" in prepared_in_words(known)[0]
+    looked = replace(known.with_force_noise(0.0), looks=2, asked=0.013)
+    (said,) = prepared_in_words(looked)
+    assert said.startswith("the force is averaged over 40.0 ms: a length asked besides")
     assert fit_to(known.with_force_noise(0.0)).floor == pytest.approx(fit.floor)
     assert all(log.force_noise == known.force_noise for log in known.logs)
 

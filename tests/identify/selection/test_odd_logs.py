@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from built_fits import built_dataset
 from planted_logs import RATE, SLIDE, Array, Ride, few, having, logged
 
 import identify
@@ -17,8 +18,9 @@ from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement, Otherwise, Recorded
 from identify.estimation.disagreement import odd_in
-from identify.output.words.odd import odd_in_words
+from identify.output.words.odd import odd_in_words, with_odd
 from identify.selection.diagnosis import AxisDiagnosis
+from twin.checks.report import CheckReport, Fault
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -236,3 +238,16 @@ def test_what_no_other_log_has_is_told_without_a_ratio() -> None:
     alone = Otherwise("coulomb_viscous.sigma2", 12.0, 0.0)
     odd = replace(fitted(runs()), odd=Disagreement("run2", 5.0, 1.0, otherwise=alone))
     assert "as if coulomb_viscous.sigma2 were there in it alone" in odd_in_words(odd)
+
+
+def test_a_check_tells_the_log_that_disagrees_and_nothing_where_none_does() -> None:
+    dataset = built_dataset("one", "two")
+    reports = {"one": CheckReport(()), "two": CheckReport(())}
+    assert with_odd(reports, {"x": dataset}) == reports
+    odd = replace(dataset, odd=Disagreement("two", 5.0, 1.0, span=(0.3, 0.7)))
+    made = with_odd(reports, {"x": odd})
+    assert made["one"] == reports["one"]
+    (finding,) = made["two"].findings
+    assert (finding.fault, finding.axis) == (Fault.ODD, "x")
+    assert "5" in finding.what
+    assert made["two"].ok
