@@ -154,8 +154,8 @@ def _hung_gain(hung: AxisModel, period: float, lines: int, speed: float) -> Arra
     )  # fmt: skip
     alone = np.fft.rfft(hung.mass * rate(velocity, period))
     taken = alone - np.fft.rfft(force[0])
-    own = slice(0, (lines - 1) * long + 1)
-    power = np.abs(taken[own]) ** 2 / np.maximum(np.abs(alone[own]) ** 2, 1e-300)
+    lowest = slice(0, (lines - 1) * long + 1)
+    power = np.abs(taken[lowest]) ** 2 / np.maximum(np.abs(alone[lowest]) ** 2, 1e-300)
     means = np.add.reduceat(power[long // 2 :], np.arange(0, len(power) - long // 2, long)) / long
     return np.concatenate([power[:1], means])[:lines]
 

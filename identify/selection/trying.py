@@ -129,9 +129,8 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
     Fitted again for that: what it takes is to be seen either way, but a start that the one group of
     logs hides, the other may show. Whoever looks more often finds more by chance, so that each is
     one of as many times the changes. What all of two or more such logs prove stands where those
-    that choose see it too. Nothing is asked where a law was doubted at the end of a
-    search, as its kin would be one after another; nor of a joint beside its bodies, which all of
-    the logs chose.
+    that choose see it too. Nothing is asked where a law was doubted at the end of a search, as its
+    kin would be one after another; nor of a joint beside its bodies, which all of the logs chose.
     """
     own = judged.dataset
     if own.beside_bodies or trial.barred or judged.at_floor:
@@ -143,18 +142,20 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
         tried = tried_beside(there, trial, within(progress, "other logs choosing"))[1]
         proved = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
-        known = {t.change.name: t for t in proved if not t.candidate.is_noise}
-        proofs.update(name for name, t in known.items() if t.candidate.supported)
-        found = known | found
+        laws = [t for t in proved if not t.candidate.is_noise]
+        proofs.update({t.change.name for t in laws if t.candidate.supported})
+        for t in laws:
+            found.setdefault(t.change.name, t)
 
     def as_they_are(t: Tried) -> Tried:
         score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
         among = (len(turns) + 1) * score.among if score else 1
-        told = judged_change(judged, t.screening, fit, among)
-        score, proved = told.candidate.score, proofs[t.change.name]
-        if score is None or not FEWEST_TURNS <= proved == len(turns):
-            return told
-        return replace(told, candidate=replace(told.candidate, score=replace(score, in_turn=True)))
+        again = judged_change(judged, t.screening, fit, among)
+        candidate = again.candidate
+        if candidate.score is None or not FEWEST_TURNS <= proofs[t.change.name] == len(turns):
+            return again
+        sure = replace(candidate.score, in_turn=True)
+        return replace(again, candidate=replace(candidate, score=sure))
 
     return [as_they_are(t) for t in found.values()]
 

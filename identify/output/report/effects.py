@@ -144,8 +144,8 @@ def ranking(view: AxisView) -> list[Block]:
 def _ranked(found: AxisDiagnosis, refitted: Sequence[Candidate]) -> TableBlock:
     """Evidence, errors, and why a candidate is not proved."""
     rows = [row_of(c, found) for c in refitted]
-    told = 3  # with their values
-    rows = [*rows[:told], *(replace(row, parameters={}) for row in rows[told:])]
+    shown = 3  # with their values
+    rows = [*rows[:shown], *(replace(row, parameters={}) for row in rows[shown:])]
     best = found.best.effect.name if found.best else ""
     caption = (
         f"Each effect alone beside the given ones, with its values there. Evidence: difference of "
