@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.test_function import SHORTEST
+from twin.core.compiled import compiled
 from twin.signals import Array, between
 
 FEWEST = 5  # samples that tell whether an axis stands
@@ -127,13 +128,20 @@ def quieted(readings: Array, most: Array, scales: int) -> Array:
 
     most: of noise that is not averaged.
     """
-    mean, out = readings - readings[0], readings.copy()
-    for j, gain in enumerate(_gains(scales)):
-        smooth = _smoothed(mean, 1 << j)
-        mean -= smooth
-        mean[np.abs(mean) > gain * most] = 0.0
-        out -= mean
-        mean = smooth
+    return np.asarray(_without_details(readings, most, _gains(scales)))
+
+
+@compiled(nogil=True)
+def _without_details(readings, most, gains):
+    mean, smooth = readings - readings[0], np.empty(len(readings))
+    out = readings.copy()
+    for j in range(len(gains)):
+        _smooth(mean, 1 << j, smooth)
+        for i in range(len(out)):
+            detail = mean[i] - smooth[i]
+            if not abs(detail) > gains[j] * most[i]:
+                out[i] -= detail
+        mean, smooth = smooth, mean
     return out
 
 
@@ -148,29 +156,30 @@ def _scales(period: float) -> int:
 
 
 @lru_cache(maxsize=8)
-def _gains(scales: int) -> tuple[float, ...]:
-    """RMS of the details of white noise of RMS 1 on each scale."""
+def _gains(scales: int) -> Array:
+    """RMS (scales,) of the details of white noise of RMS 1 on each scale."""
     mean, gains = np.zeros(1 << (scales + 3)), []
     mean[len(mean) // 2] = 1.0
     for j in range(scales):
-        smooth = _smoothed(mean, 1 << j)
+        smooth = np.empty_like(mean)
+        _smooth(mean, 1 << j, smooth)
         gains.append(float(np.linalg.norm(mean - smooth)))
         mean = smooth
-    return tuple(gains)
+    return np.array(gains)
 
 
-def _smoothed(signal: Array, apart: int) -> Array:
+@compiled(nogil=True)
+def _smooth(signal, apart, out):
     """Mean (n,) of five values so many samples apart; beyond the ends are the end values."""
-    n, padded = len(signal), np.pad(signal, 2 * apart, mode="edge")
-    far, near, middle = SPLINE
-    out = middle * signal
-    beside = padded[apart : apart + n] + padded[3 * apart : 3 * apart + n]
-    beside *= near
-    out += beside
-    np.add(padded[:n], padded[4 * apart :], out=beside)
-    beside *= far
-    out += beside
-    return np.asarray(out)
+    last = len(signal) - 1
+    for i in range(last + 1):
+        if 2 * apart <= i <= last - 2 * apart:
+            near = signal[i - apart] + signal[i + apart]
+            far = signal[i - 2 * apart] + signal[i + 2 * apart]
+        else:
+            near = signal[max(i - apart, 0)] + signal[min(i + apart, last)]
+            far = signal[max(i - 2 * apart, 0)] + signal[min(i + 2 * apart, last)]
+        out[i] = SPLINE[2] * signal[i] + SPLINE[1] * near + SPLINE[0] * far
 
 
 def _highest(signal: Array, samples: int) -> Array:
