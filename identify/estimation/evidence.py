@@ -14,7 +14,7 @@ from twin.signals import Array
 
 BLOCKS = 24  # of time, for a standard error: many for Student's t, each longer than the memory
 SURE = 3.0  # standard errors from which a value is the data's: of noise one in 700 is as far off
-TOGETHER = 16  # columns of whole logs at once: they are most of the memory
+AT_ONCE = 16  # columns of whole logs at once: they are most of the memory
 BETTER = 0.99  # of an error, from which another one is hardly better
 
 
@@ -67,12 +67,13 @@ def taken_by_lag(columns: Array, penalty: Array) -> Array:
     """
     count, gram = len(columns), columns.T @ columns
     size = np.sqrt(np.where(np.diag(gram) > 0.0, np.diag(gram), 1.0))
-    scaled = (gram + penalty) / np.outer(size, size) + ROUNDING * np.eye(len(size))
-    apart = np.linalg.inv(np.linalg.cholesky(scaled)).T / size[:, None]
-    padded, power = _padded(count), 0.0
-    for some in range(0, len(size), TOGETHER):
-        independent = columns @ apart[:, some : some + TOGETHER]
-        power = power + np.sum(np.abs(np.fft.rfft(independent.T, padded)) ** 2, axis=0)
+    squares, ways = np.linalg.eigh((gram + penalty) / np.outer(size, size))
+    apart = squares > ROUNDING * len(size)  # a column that others hold adds nothing
+    independent = ways[:, apart] / np.sqrt(squares[apart]) / size[:, None]
+    padded, power = _padded(count), np.zeros(_padded(count) // 2 + 1)
+    for some in range(0, independent.shape[1], AT_ONCE):
+        forces = columns @ independent[:, some : some + AT_ONCE]
+        power += np.sum(np.abs(np.fft.rfft(forces.T, padded)) ** 2, axis=0)
     return np.asarray(np.fft.irfft(power, padded)[:count]) / count
 
 

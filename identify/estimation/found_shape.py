@@ -36,7 +36,7 @@ BOTH, AHEAD, BEHIND = "both directions", "forwards", "backwards"
 
 
 @record
-class Drawn:
+class FoundCurve:
     """One curve, each (k,) N: as the law assumes it, as the logs show it, half its 90 % band."""
 
     assumed: Values
@@ -57,7 +57,7 @@ class FoundShape:
     lets_go_at_standstill: bool
     unit: str
     """Of the force."""
-    curves: Mapping[str, Drawn]
+    curves: Mapping[str, FoundCurve]
     """By direction; not a number where no training log has been."""
 
     @property
@@ -93,7 +93,7 @@ def found_shape(shape: Shape, fit: Fit, dataset: Dataset) -> FoundShape:
         visits = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", weights, gram, weights), 0.0))
         # 0.02 of the most visited knot's weight, below which a knot is not drawn
         been = np.where(visits > 0.02 * visits.max(), 1.0, np.nan)
-        curves[name] = Drawn(
+        curves[name] = FoundCurve(
             assumed=been * (weights @ assumed),
             found=been * (weights @ (assumed + correction[own])),
             band_90=been * BAND * np.sqrt(np.einsum("ki,ij,kj->k", full, spread, full)),
@@ -204,7 +204,7 @@ def exponent_curve(held: Fitted, final: Fit, dataset: Dataset) -> FoundShape:
     for name, way in ((AHEAD, 1), (BEHIND, -1)):
         at = partial(force, velocity=way * speed)
         found, band = with_band(final, at, among)
-        curves[name] = Drawn(at(final.axis.with_effect(held)), found, band)
+        curves[name] = FoundCurve(at(final.axis.with_effect(held)), found, band)
     units = final.axis.units
     return FoundShape(
         Coordinate.SPEED, speed, units(UNITS[Coordinate.SPEED]), None, False, units.force, curves

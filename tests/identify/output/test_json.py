@@ -23,7 +23,7 @@ from strict_json import shipped, strict, told, valid
 
 import identify
 from identify.estimation.fit import Outcome
-from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
+from identify.estimation.found_shape import FoundCurve, FoundShape, FreeExponent
 from identify.output.answers import Answer, answer_of, plain
 from identify.output.answers.machine import EffectAnswer, check_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
@@ -42,7 +42,7 @@ KEPT = Path(__file__).with_name("answers.json")
 
 
 def of_another_shape():
-    drawn = Drawn(*(np.array(v) for v in ([1.0, 1.5], [1.2, math.nan], [0.31, 0.43])))
+    drawn = FoundCurve(*(np.array(v) for v in ([1.0, 1.5], [1.2, math.nan], [0.31, 0.43])))
     shape = FoundShape(
         Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N", {"forwards": drawn}
     )

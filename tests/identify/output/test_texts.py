@@ -19,7 +19,7 @@ from built_fits import CATALOGUE, NOISE, built, built_fit, fitted, step
 from identify.dataset.dataset import Role
 from identify.estimation.confounded import Refit
 from identify.estimation.fit import Outcome
-from identify.estimation.found_shape import Drawn, FoundShape, FreeExponent
+from identify.estimation.found_shape import FoundCurve, FoundShape, FreeExponent
 from identify.estimation.intervals import refusal
 from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
@@ -58,7 +58,7 @@ ALONE = replace(COGGING, tied=())
 TRAINED = replace(made.DATASET, channel_delay=0.0, selection=())
 SHAPE = FoundShape(
     Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N",
-    {"forwards": Drawn(np.array([1.0, 1.5]), np.array([1.2, 2.9]), np.array([0.31, 0.43]))},
+    {"forwards": FoundCurve(np.array([1.0, 1.5]), np.array([1.2, 2.9]), np.array([0.31, 0.43]))},
 )  # fmt: skip
 
 
