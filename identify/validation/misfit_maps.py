@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from identify.estimation.force_balance import unbalanced
 from identify.estimation.residual_dependence import UNITS, unit_of
 from twin.model.machine import AxisModel
 from twin.model.units import LINEAR
-from twin.record import Number, record
+from twin.record import Number, Values, record
 from twin.signals import Array
 
 ABOVE_FLOOR = 1.5  # error over noise floor from which a region counts as bad
@@ -28,25 +27,24 @@ KNOWN_UNITS = {**UNITS, "command": LINEAR.force, "standstill": "1"}  # of a line
 TWO_SIDED = {"direction": np.array([-1.5, 0.0, 1.5]), "standstill": np.array([-0.5, 0.5, 1.5])}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MisfitMap:
-    """Misfit along one coordinate: bin centres (n,), mean and RMS force error (n,) in force_unit.
-
-    share (n,): part of the whole squared force error in each bin; visited (n,): part of the time,
-    or for frequency part of the squared force to be explained. floor (n,): noise floor of each bin,
-    N RMS. For frequency the mean is not a number.
-    """
+    """The force residual by bins (n,) of one coordinate."""
 
     coordinate: str
     unit: str
-    centre: Array
-    low: Array
-    high: Array
-    mean: Array
-    rms: Array
-    share: Array
-    visited: Array
-    floor: Array
+    centre: Values
+    low: Values
+    high: Values
+    mean: Values
+    """Of frequency bands not a number."""
+    force_error: Values
+    """RMS."""
+    share: Values
+    """Of the squared error."""
+    visited: Values
+    """Part of the time; of frequency bands that of the squared force to be explained."""
+    noise_floor: Values
     force_unit: str = LINEAR.force
 
 
@@ -128,10 +126,10 @@ def misfit_map(
         low=edges[:-1],
         high=edges[1:],
         mean=np.bincount(index, residual, bins) / count,
-        rms=np.sqrt(square / count),
+        force_error=np.sqrt(square / count),
         share=square / max(square.sum(), TINY),
         visited=np.bincount(index, minlength=bins) / len(index),
-        floor=np.full(bins, floor),
+        noise_floor=np.full(bins, floor),
         force_unit=force_unit,
     )
 
@@ -166,10 +164,10 @@ def misfit_by_frequency(axis: AxisModel, logs: Sequence[PreparedLog]) -> MisfitM
         low=edges[:-1],
         high=edges[1:],
         mean=np.full(len(error), np.nan),
-        rms=error,
+        force_error=error,
         share=error**2 / max(np.sum(error**2), TINY),
         visited=to_explain**2 / max(np.sum(to_explain**2), TINY),
-        floor=noise,
+        noise_floor=noise,
         force_unit=axis.units.force,
     )
 
@@ -215,7 +213,7 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
     tried = sum(int(np.count_nonzero(m.visited)) for m in maps)
     found = []
     for m in maps:
-        excess = np.where(m.rms > ABOVE_FLOOR * m.floor, m.share - m.visited, 0.0)
+        excess = np.where(m.force_error > ABOVE_FLOOR * m.noise_floor, m.share - m.visited, 0.0)
         if excess.max() < LEAST_SHARE:
             continue
         from scipy.special import chdtri  # where no region stands out, as in a fit, nothing asks
@@ -223,10 +221,11 @@ def worst_regions(maps: Sequence[MisfitMap], samples: float, count: int = 3) -> 
         values = np.maximum(samples * m.visited, 1.0)
         # probability that noise alone makes any region of all maps count as bad
         chance = np.sqrt(chdtri(values, 0.01 / max(tried, 1)) / values)
-        excess[~(m.rms > chance * m.floor)] = 0.0
+        excess[~(m.force_error > chance * m.noise_floor)] = 0.0
         i = int(np.argmax(excess))
         low, high, error, floor, share, visited = (
-            float(values[i]) for values in (m.low, m.high, m.rms, m.floor, m.share, m.visited)
+            float(values[i])
+            for values in (m.low, m.high, m.force_error, m.noise_floor, m.share, m.visited)
         )
         if excess[i] >= LEAST_SHARE:
             region = Region(

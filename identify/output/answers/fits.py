@@ -21,6 +21,7 @@ from identify.output.words.fit import (
 from identify.results.results import Comparison, Feedforward, FitResult, SimulationFit, refitted
 from identify.validation.agreement import Agreement, AxisAgreement
 from identify.validation.comparison import AxisComparison
+from identify.validation.misfit_maps import MisfitMap
 from identify.validation.tracking import AxisTracking
 from identify.validation.whiteness import Correlation
 
@@ -247,18 +248,6 @@ class LogErrorsEntry(Entry):
     position_ratio: Number
 
 
-class MapEntry(Entry):
-    """The force residual by regions of a coordinate."""
-
-    unit: str
-    centre: list[Number]
-    mean: list[Number]
-    share: list[Number]
-    """Of the squared error."""
-    force_error: list[Number] = read("rms")
-    noise_floor: list[Number] = read("floor")
-
-
 class HistogramEntry(Entry):
     """How the force residual is distributed."""
 
@@ -288,7 +277,7 @@ class ComparisonEntry(Entry):
     logs: dict[str, LogErrorsEntry]
     noise_floor: Number = read("floor")
     position_drift_of_noise: dict[str, Number] = read("position_floor")
-    regions: dict[str, MapEntry]
+    regions: dict[str, MisfitMap]
     worst: list[str]
     residual_tests: ResidualTestsEntry
 

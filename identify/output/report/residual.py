@@ -87,9 +87,9 @@ def dependence_table(dependence: Dependence, maps: Sequence[MisfitMap], found: s
 
 def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
     """The error by frequency beside its noise."""
-    scale = DisplayUnit.of(units.force, one.rms)
+    scale = DisplayUnit.of(units.force, one.force_error)
     edges = np.append(one.low, one.high[-1])
-    shown = (np.where(one.visited > 0.0, one.rms, np.nan), one.floor)
+    shown = (np.where(one.visited > 0.0, one.force_error, np.nan), one.noise_floor)
     error, noise = (  # a band reaches from its lower edge to its upper: the last value stands twice
         scale(np.where(values > 0.0, values, np.nan)[[*range(len(values)), -1]]) for values in shown
     )

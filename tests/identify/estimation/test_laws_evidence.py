@@ -81,7 +81,9 @@ def test_columns_take_of_noise_what_it_holds_where_they_are(pole, turns):
     told = by_chance(taken_by_lag(columns, np.zeros((4, 4))), colour)
     assert told == pytest.approx(np.mean(share), rel=0.15)
     assert told == pytest.approx(0.004, rel=1e-6) if pole == 0.0 else (told > 0.01) == (turns < 10)
-    twice = taken_by_lag(np.hstack([columns, columns[:, 1:], np.zeros((1000, 1))]), np.zeros((8, 8)))
+    twice = taken_by_lag(
+        np.hstack([columns, columns[:, 1:], np.zeros((1000, 1))]), np.zeros((8, 8))
+    )
     assert by_chance(twice, colour) == pytest.approx(told, rel=1e-6)
     stiff = 1e9 * np.eye(4)
     assert by_chance(taken_by_lag(columns, stiff), colour) < 1e-3 * told

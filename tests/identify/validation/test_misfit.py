@@ -85,12 +85,12 @@ def test_a_map_is_the_plain_sum_over_its_bins():
         last = x <= edges[i + 1] if i == 23 else x < edges[i + 1]
         inside = (x >= edges[i]) & last
         assert found.mean[i] == pytest.approx(r[inside].mean())
-        assert found.rms[i] == pytest.approx(np.sqrt(np.mean(r[inside] ** 2)))
+        assert found.force_error[i] == pytest.approx(np.sqrt(np.mean(r[inside] ** 2)))
         assert found.share[i] == pytest.approx(np.sum(r[inside] ** 2) / np.sum(r**2))
         assert found.visited[i] == pytest.approx(inside.mean())
         assert (found.low[i], found.high[i]) == pytest.approx((edges[i], edges[i + 1]))
     np.testing.assert_allclose(found.centre, 0.5 * (edges[1:] + edges[:-1]))
-    assert (found.floor == 0.07).all()
+    assert (found.noise_floor == 0.07).all()
     assert found.coordinate == "position"
     assert (found.unit, misfit_map("roller_phase", r, x, 0.1).unit) == ("m", "m")
     assert misfit_map("velocity", r, x, 0.1).unit == "m/s"
@@ -199,20 +199,20 @@ def test_the_error_by_frequency_is_the_residual_in_its_band():
         pumped = windowed(replace(log.motion, track=Blocks(signals, raw)))
         found = misfit_by_frequency(AxisModel(MASS), [pumped])
         own = (found.low <= frequency) & (frequency < found.high)
-        assert found.rms[own] == pytest.approx(height / np.sqrt(2.0), rel=0.06)
-        assert found.rms[~own].max() < 0.2 * found.rms[own][0]
+        assert found.force_error[own] == pytest.approx(height / np.sqrt(2.0), rel=0.06)
+        assert found.force_error[~own].max() < 0.2 * found.force_error[own][0]
     np.testing.assert_array_equal(found.low[1:], found.high[:-1])
     np.testing.assert_allclose(found.centre**2, found.low * found.high)
     wide = found.low > 1.5
     np.testing.assert_allclose(found.high[wide] / found.low[wide], np.sqrt(2.0))
     width = np.sqrt(found.high - found.low)
-    np.testing.assert_allclose(found.floor, width * 1e-3 * np.sqrt(2.0 / RATE), rtol=0.3)
+    np.testing.assert_allclose(found.noise_floor, width * 1e-3 * np.sqrt(2.0 / RATE), rtol=0.3)
     assert found.share.sum() == pytest.approx(1.0)
     near = (found.low < 1.3) & (found.high > 1.3)
     heavy = misfit_by_frequency(AxisModel(2.0 * MASS), [pumped])
     # The inertia takes up the force of the motion at 1.3 Hz.
     assert found.visited[near][0] < 0.05 * heavy.visited[near][0]
-    low = np.sqrt(np.sum(heavy.rms[heavy.low < 4.0] ** 2))
+    low = np.sqrt(np.sum(heavy.force_error[heavy.low < 4.0] ** 2))
     pushes = PUSH(np.arange(8000) / RATE)
     assert low == pytest.approx(MASS * np.std(pushes), rel=0.1)
 
@@ -223,10 +223,10 @@ def test_the_power_of_logs_is_weighed_by_their_lengths():
     one, two, both = (misfit_by_frequency(axis, part) for part in (logs[:1], logs[1:], logs))
     ends = [log.motion.time[-1] for log in logs]
     wide = one.low > 10.0
-    wanted = (ends[0] * one.rms**2 + ends[1] * two.rms**2) / sum(ends)
-    np.testing.assert_allclose(both.rms[wide] ** 2, wanted[wide], rtol=0.02)
-    noise = (ends[0] * one.floor**2 + ends[1] * two.floor**2) / sum(ends)
-    np.testing.assert_allclose(both.floor[wide] ** 2, noise[wide], rtol=0.02)
+    wanted = (ends[0] * one.force_error**2 + ends[1] * two.force_error**2) / sum(ends)
+    np.testing.assert_allclose(both.force_error[wide] ** 2, wanted[wide], rtol=0.02)
+    noise = (ends[0] * one.noise_floor**2 + ends[1] * two.noise_floor**2) / sum(ends)
+    np.testing.assert_allclose(both.noise_floor[wide] ** 2, noise[wide], rtol=0.02)
 
 
 # Residual tests: white stays within the bounds, what is coloured or knows the input does not
