@@ -121,17 +121,16 @@ def steps_of(entries, first, last, n_states, period):
 
 
 @compiled()
-def along(entries, first, last, p, s, io, velocity, k, standing, steps, rows):
+def along(entries, first, last, p, s, io, slopes, k, standing, steps, rows):
     """Force (N) of structure effects along block k of a measured motion; their states advance.
 
-    velocity (n,) m/s: means of blocks of DT s. standing: as ``stands`` says of them. A block is
-    walked in so many steps, as ``steps_of`` says, with the acceleration a parabola that has the
-    means of the blocks around it. rows (2, n_entries): the first receives the block's mean, the
-    second is overwritten.
+    slopes (n,) m/s^2: of the velocity, in the middle of each block. standing: as ``stands`` says
+    of them. A block is walked in so many steps, as ``steps_of`` says, with the acceleration a
+    parabola that has the means of the blocks around it. rows (2, n_entries): the first receives the
+    block's mean, the second is overwritten.
     """
-    block, ended = io[DT], velocity.shape[0] - 1
-    now = slope(velocity, k, block)
-    before, after = slope(velocity, max(k - 1, 0), block), slope(velocity, min(k + 1, ended), block)
+    block, now = io[DT], slopes[k]
+    before, after = slopes[max(k - 1, 0)], slopes[min(k + 1, slopes.shape[0] - 1)]
     rise, bend = 0.5 * (after - before), 0.5 * (after - 2.0 * now + before)
     rows[0, first:last] = 0.0
     answered = (0.0, 0.0, 0.0, 0.0)
@@ -162,15 +161,18 @@ def shared(answered, mass, measured):
     return net / mass, (net + pushed) / free
 
 
-@compiled(inline=True)
-def slope(values, k, dt):
-    """Derivative of equally spaced means in the middle of number k, of fourth order inside."""
-    last = values.shape[0] - 1
-    if 2 <= k <= last - 2:
-        near, far = values[k + 1] - values[k - 1], values[k + 2] - values[k - 2]
-        return (8.0 * near - far) / (12.0 * dt)
-    after, before = min(k + 1, last), max(k - 1, 0)
-    return (values[after] - values[before]) / (max(after - before, 1) * dt)
+@compiled()
+def slopes_of(values, dt):
+    """Derivatives (n,) of equally spaced means in the middle of each, of fourth order inside."""
+    last, out = values.shape[0] - 1, np.empty(values.shape[0])
+    for k in range(last + 1):
+        if 2 <= k <= last - 2:
+            near, far = values[k + 1] - values[k - 1], values[k + 2] - values[k - 2]
+            out[k] = (8.0 * near - far) / (12.0 * dt)
+        else:
+            after, before = min(k + 1, last), max(k - 1, 0)
+            out[k] = (values[after] - values[before]) / (max(after - before, 1) * dt)
+    return out
 
 
 # States every axis has before those of its effects.

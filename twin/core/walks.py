@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.core.compiled import ADDRESS, KIND, P_AT, S_AT, address_of, borrow, call_at, compiled
-from twin.core.native import along, axis_force, sense, stands, steps_of
+from twin.core.native import along, axis_force, sense, slopes_of, stands, steps_of
 from twin.effect import (
     A_OTHER,
     COLUMNS,
@@ -145,12 +145,13 @@ def _walk(
     entries, parameters, states = borrow((entries, parameters, states))
     p, s = parameters.ctypes.data, states.ctypes.data
     standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
+    slopes = slopes_of(motion[1], dt) if structure < last else motion[1]
     for k in range(motion.shape[1]):
         arrive(io, motion, others, k, begin, dt, time_origin)
         lent = borrow(row)
         axis_force(entries, first, structure, parameters, states, at, borrow(io), lent, 0)
         if structure < last:
-            along(entries, structure, last, p, s, borrow(io), motion[1], k, standing, steps, lent)
+            along(entries, structure, last, p, s, borrow(io), slopes, k, standing, steps, lent)
         for i in range(first, last):
             rows[i, k] = row[0, i]
 
@@ -163,6 +164,7 @@ def _walk_sets(
     addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], laws[P_AT], laws[S_AT]
     w = io.ctypes.data
     stiff = 1e300 / dt
+    slopes = slopes_of(motion[1], dt) if structure < last else motion[1]
     for j in range(sets.shape[0]):
         p, s = sets[j].ctypes.data, states[j].ctypes.data
         own, friction = totals[j], 0.0
@@ -188,7 +190,7 @@ def _walk_sets(
             if structure < last:
                 lent, own_io = borrow(row), borrow(io)
                 io[V] = motion[1, k]
-                along(entries, structure, last, p, s, own_io, motion[1], k, standing, steps, lent)
+                along(entries, structure, last, p, s, own_io, slopes, k, standing, steps, lent)
                 for i in range(structure, last):
                     own[k] += row[0, i]
 
