@@ -161,38 +161,48 @@ def _walk_sets(
     entries, laws, structure, last, sets, states, motion, others, dt, begin, totals, time_origin,
     io, steps, row, remembers, path,
 ):  # fmt: skip
-    addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], laws[P_AT], laws[S_AT]
-    w = io.ctypes.data
+    addresses, kinds, p_at, s_at = laws[ADDRESS], laws[KIND], 8 * laws[P_AT], 8 * laws[S_AT]
+    w, last_law = io.ctypes.data, laws.shape[1]
+    first_p, next_p = sets.ctypes.data, sets.strides[0]
+    first_s, next_s = states.ctypes.data, states.strides[0]
     stiff = 1e300 / dt
     slopes = slopes_of(motion[1], dt) if structure < last else motion[1]
-    for j in range(sets.shape[0]):
-        p, s = sets[j].ctypes.data, states[j].ctypes.data
-        own, friction = totals[j], 0.0
-        standing = structure < last and stands(entries, structure, last, p, s, borrow(io))
-        for k in range(motion.shape[1]):
-            arrive(io, motion, others, k, begin, dt, time_origin)
+    frictions = np.zeros(sets.shape[0])
+    standing = np.zeros(sets.shape[0], dtype=np.bool_)
+    for j in range(sets.shape[0] if structure < last else 0):
+        p, s = first_p + j * next_p, first_s + j * next_s
+        standing[j] = stands(entries, structure, last, p, s, borrow(io))
+    for k in range(motion.shape[1]):
+        arrive(io, motion, others, k, begin, dt, time_origin)
+        velocity, command, followed = motion[1, k], motion[2, k], path[k]
+        stop = stiff * velocity
+        for j in range(sets.shape[0]):
+            p, s = first_p + j * next_p, first_s + j * next_s
+            friction = frictions[j]
+            io[U] = command
             io[DRY] = 1.0
             io[STATIC] = 1.0
             io[VISCOUS] = 1.0
             io[FRICTION] = friction
-            stop = stiff * motion[1, k]
             total = 0.0
-            for i in range(laws.shape[1]):
+            for i in range(last_law):
                 io[HOLD] = stop + io[U] + total
                 io[OUT] = 0.0
-                io[V] = path[k] if remembers[i] else motion[1, k]
-                call_at(addresses[i], (p + 8 * p_at[i], s + 8 * s_at[i], w))
+                io[V] = followed if remembers[i] else velocity
+                call_at(addresses[i], (p + p_at[i], s + s_at[i], w))
                 if kinds[i] == _FORCE:
                     total += io[OUT]
                 elif kinds[i] == _FRICTION:
                     friction = io[OUT]
-            own[k] = total - friction + (io[U] - motion[2, k])
+            frictions[j] = friction
+            total = total - friction + (io[U] - command)
             if structure < last:
                 lent, own_io = borrow(row), borrow(io)
-                io[V] = motion[1, k]
-                along(entries, structure, last, p, s, own_io, slopes, k, standing, steps, lent)
+                io[V] = velocity
+                along(entries, structure, last, p, s, own_io, slopes, k, standing[j], steps, lent)
                 for i in range(structure, last):
-                    own[k] += row[0, i]
+                    total += row[0, i]
+            totals[j, k] = total
 
 
 @compiled(nogil=True)
