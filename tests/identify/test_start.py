@@ -63,6 +63,8 @@ def test_a_short_command_loads_nothing_that_it_does_not_need(command: str, tmp_p
     found = started(*command.split(), *more, folder=tmp_path)
     assert not HEAVY & set(found["loaded"])
     assert ("numpy" in found["loaded"]) == (command == "check")
+    if command == "--help":  # which is asked often, and starts in a tenth of a second
+        assert "pydantic" not in found["loaded"]
 
 
 def test_matrices_are_not_shared_out_unless_the_user_says_so(tmp_path: Path) -> None:

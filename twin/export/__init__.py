@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from twin.errors import InputError, near
-from twin.record import record
 
 if TYPE_CHECKING:
     from twin.logs import Log
     from twin.model.machine import MachineModel
 
 
-@record
+@dataclass(frozen=True)
 class Remark:
     """What a format makes of a part of the model that it cannot hold as it is."""
 
@@ -181,7 +180,7 @@ def _templates() -> Any:
     return found
 
 
-@record
+@dataclass(frozen=True)
 class Outdated:
     """A file that is not as the model gives it now."""
 
