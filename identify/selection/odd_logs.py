@@ -40,7 +40,7 @@ def without_odd_log(
     if not _is_unexplained(ended):
         return ended, odd
     if _spoiling(odd, dataset):
-        return _with_it(base, dataset, conclude, ended, odd)
+        return _of_all(conclude(base, dataset), dataset, (ended, odd))
     if _may_be_all(odd):
         return ended, None
     return _without_suspect(base, dataset, conclude) or (ended, odd)
@@ -51,22 +51,17 @@ def _may_be_all(odd: Disagreement | None) -> bool:
     return odd is not None and odd.is_of_recording and not odd.is_sure
 
 
-def _with_it(
-    base: Fit,
-    dataset: Dataset,
-    conclude: Callable[[Fit, Dataset], Conclusion],
-    ended: Conclusion,
-    odd: Disagreement | None,
+def _of_all(
+    whole: Conclusion, dataset: Dataset, without: tuple[Conclusion, Disagreement | None]
 ) -> tuple[Conclusion, Disagreement | None]:
     """What all logs come to, where the others are not explained without an odd one.
 
     That it is odd stands unless all together prove something, beside which it is not.
     """
-    whole = conclude(base, dataset)
     beside = _odd_beside(whole, dataset)
     if whole.findings and _spoiling(beside, dataset) is None:
         return whole, beside
-    return (whole, None) if _may_be_all(odd) else (ended, odd)
+    return (whole, None) if _may_be_all(without[1]) else without
 
 
 def _spoiling(odd: Disagreement | None, dataset: Dataset) -> str | None:
