@@ -21,13 +21,15 @@ CONFIG = ConfigDict(
 )  # fmt: skip
 
 
-def _known(value: Any) -> Any:
-    return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def _plain(value: Any) -> Any:
+def unwrapped(value: Any) -> Any:
+    """Arrays as lists, members of an enum by their values."""
     listed = value.tolist() if hasattr(value, "tolist") else value
     return listed.value if isinstance(listed, Enum) else listed
+
+
+def _known(value: Any) -> Any:
+    value = unwrapped(value)
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 if TYPE_CHECKING:
@@ -41,10 +43,10 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     computed = property
 else:
-    Number = Annotated[float | None, BeforeValidator(lambda v: _known(_plain(v)))]
+    Number = Annotated[float | None, BeforeValidator(_known)]
     """In the JSON null, where it is infinite or no number."""
-    Values = Annotated[list[Number], BeforeValidator(_plain)]
-    Flags = Annotated[list[bool], BeforeValidator(_plain)]
+    Values = Annotated[list[Number], BeforeValidator(unwrapped)]
+    Flags = Annotated[list[bool], BeforeValidator(unwrapped)]
     """Arrays (n,), in the JSON lists."""
 
     def computed(function):

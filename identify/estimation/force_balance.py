@@ -34,6 +34,7 @@ from identify.dataset.prepared_log import (
 from identify.dataset.test_function import SHORTEST
 from identify.dataset.time_scale import QUIET
 from identify.estimation.force_along import force_along
+from identify.estimation.scaling import STEP, difference_step
 from twin.core.compiled import P_AT
 from twin.core.native import Table
 from twin.core.settling import settle
@@ -42,15 +43,12 @@ from twin.effect import RUBBING, Kind
 from twin.errors import InputError
 from twin.model.machine import AxisModel, axis_table
 from twin.model.parameters import ParameterReference, read, write
-from twin.model.units import Scale, has_size
 from twin.parallel import spread
 from twin.signals import Array, between
 from twin.threads import trim_beside
 
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
-
-STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
 
 
 def averaged_force(axis: AxisModel, logs: Sequence[PreparedLog]) -> Array:
@@ -488,15 +486,3 @@ def _by_mass(axis: AxisModel, steps: Array, log: PreparedLog) -> Array:
     )
     attached = replace(attached, effects=tuple(alike))
     return np.asarray(steps * (averaged_force(attached, [log]) / axis.mass - log.acceleration))
-
-
-def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
-    """A step within the bounds, small relative to the value or to what is usual on this machine.
-
-    A positive scale counts by itself; a strength or a place may be zero.
-    """
-    p = c.parameter
-    usual = scale.size(p.unit) if has_size(p.unit) else min(p.upper - p.lower, 1.0)
-    # 1e-3 of what is usual, by which a smaller value is stepped as if it were that large
-    size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), 1e-3 * usual))
-    return size if value + size <= p.upper else -size

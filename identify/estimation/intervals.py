@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from identify.dataset.prepared_log import scale_of
 from identify.estimation.evidence import BLOCKS, blocks_of, by_blocks, left_out, students_t
 from identify.estimation.fit import Fit, is_linear
-from identify.estimation.force_balance import STEP, changes
+from identify.estimation.force_balance import changes
 from identify.estimation.least_squares import ROUNDING
+from identify.estimation.scaling import STEP
 from identify.rules import RULE
 from twin.effect import LEAST, Parameter
 from twin.model.machine import AxisIntervals, AxisModel

@@ -26,6 +26,7 @@ from twin.signals import Array
 
 Limits = tuple[float, float]
 
+STEP = float(np.cbrt(np.finfo(float).eps))  # of a value, of a difference quotient
 AT_EDGE = float(np.sqrt(np.finfo(float).eps))  # of a bound, within which a value is at it
 
 
@@ -43,6 +44,18 @@ def limits_of(p: Parameter, value: float, scale: Scale) -> Limits:
     most = 4.0 if (force, length) == (0, 1) else decades
     low, high = max(p.lower, usual / decades), min(p.upper, usual * most)
     return min(low, value), max(high, value)
+
+
+def difference_step(c: ParameterReference, value: float, scale: Scale) -> float:
+    """A step within the bounds, small relative to the value or to what is usual on this machine.
+
+    A positive scale counts by itself; a strength or a place may be zero.
+    """
+    p = c.parameter
+    usual = scale.size(p.unit) if has_size(p.unit) else min(p.upper - p.lower, 1.0)
+    # 1e-3 of what is usual, by which a smaller value is stepped as if it were that large
+    size = STEP * (abs(value) if p.lower > 0.0 else max(abs(value), 1e-3 * usual))
+    return size if value + size <= p.upper else -size
 
 
 def _fenced(

@@ -7,9 +7,7 @@ units. ``python -m identify.output.as_json`` writes the schema anew.
 
 from __future__ import annotations
 
-from enum import Enum
 from functools import singledispatch
-from math import isfinite
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, Self
@@ -27,16 +25,12 @@ from pydantic import (
 )
 from pydantic_core import to_jsonable_python
 
+from twin.record import unwrapped
+
 SCHEMA = "answers-1"  # the number grows when an entry goes, or gets another meaning
-Number = Annotated[float | None, BeforeValidator(lambda v: v if _is_number(v) else None)]
-"""Null: not a number, infinite, or none."""
 File = Annotated[str, BeforeValidator(lambda v: str(v) if isinstance(v, Path) else v)]  # as typed
 LOWER = BeforeValidator(str.lower)  # of the name of an enum's member
 Told = Annotated[str | None, BeforeValidator(lambda v: v or None)]  # null: there is nothing to tell
-
-
-def _is_number(value: Any) -> bool:
-    return not isinstance(value, float) or isfinite(value)
 
 
 def read(path: str) -> Any:
@@ -71,9 +65,7 @@ class Entry(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _of_array_or_enum(cls, value: Any) -> Any:
-        if hasattr(value, "tolist"):
-            return value.tolist()
-        return value.value if isinstance(value, Enum) else value
+        return unwrapped(value)
 
     @classmethod
     def of(cls, *sources: object, **given: Any) -> Self:

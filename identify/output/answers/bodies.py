@@ -9,9 +9,10 @@ from pydantic import Field
 from identify.dataset.body import INERTIAL
 from identify.dataset.dataset import Role
 from identify.mechanism.bodies import WrongBody
-from identify.output.answers import Answer, Entry, Number, answer_of, read
+from identify.output.answers import Answer, Entry, answer_of, read
 from identify.results.grown import CorrectedBody
 from twin.model.machine import MachineModel
+from twin.record import Number
 
 
 class InertialEntry(Entry):

@@ -11,7 +11,7 @@ from identify.dataset.dataset import Role
 from identify.estimation.confounded import Refit
 from identify.estimation.found_shape import FoundShape, FreeExponent
 from identify.estimation.residual_dependence import Dependence, Repeat
-from identify.output.answers import LOWER, Answer, Entry, File, Number, answer_of, read
+from identify.output.answers import LOWER, Answer, Entry, File, answer_of, read
 from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
     EstimateEntry,
@@ -37,7 +37,7 @@ from identify.selection.roles import RoleDependent
 from identify.validation.misfit_maps import Region
 from twin.knee import Imitated
 from twin.model.file import format_model
-from twin.record import record
+from twin.record import Number, record
 
 
 class ValuesEntry(Entry):

@@ -9,7 +9,7 @@ from pydantic import Field
 from identify.estimation.confounded import Refit
 from identify.estimation.intervals import Estimate
 from identify.estimation.simulated_motion import MotionFit
-from identify.output.answers import LOWER, Answer, Entry, Number, answer_of, read
+from identify.output.answers import LOWER, Answer, Entry, answer_of, read
 from identify.output.words.fit import (
     LOOPS,
     MOTION_OUTCOMES,
@@ -24,6 +24,7 @@ from identify.validation.comparison import AxisComparison
 from identify.validation.misfit_maps import MisfitMap
 from identify.validation.tracking import AxisTracking
 from identify.validation.whiteness import Correlation
+from twin.record import Number
 
 # --- fits ------------------------------------------------------------------------------------
 
@@ -243,9 +244,9 @@ class LogErrorsEntry(Entry):
     force_error: Number
     force_unit: str
     force_ratio: Number
-    position_error: Number
+    position_error: Number | None
     position_unit: str
-    position_ratio: Number
+    position_ratio: Number | None
 
 
 class HistogramEntry(Entry):

@@ -6,8 +6,9 @@ from typing import Any
 
 from identify.frequency.of_logs import AxisFrequency, Bias, Shown
 from identify.frequency.plant import Banded, Mode
-from identify.output.answers import Answer, Entry, Number, answer_of
+from identify.output.answers import Answer, Entry, answer_of
 from identify.results.frequency import FrequencyResponse
+from twin.record import Number
 
 
 class PlantEntry(Entry):

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, field_validator
 
-from identify.output.answers import LOWER, Answer, Entry, File, Number, Told, read
+from identify.output.answers import LOWER, Answer, Entry, File, Told, read
 from twin.export import Outdated, Remark
+from twin.record import Number
 
 if TYPE_CHECKING:  # a command that only shows the catalogue loads no NumPy
     from twin.checks.long import AxisInfo, LogInfo

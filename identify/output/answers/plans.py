@@ -6,10 +6,11 @@ from typing import Any
 
 from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.plan import Plan
-from identify.output.answers import Answer, Entry, File, Number, answer_of, read
+from identify.output.answers import Answer, Entry, File, answer_of, read
 from identify.output.words.next_step import gap_in_words, in_order, not_run_in_words
 from twin.experiments.file import parameters
 from twin.experiments.kinds import kind_of
+from twin.record import Number
 
 
 class ExperimentEntry(Entry):
