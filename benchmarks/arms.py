@@ -106,7 +106,7 @@ def _carried(arm: Arm, joint: int) -> float:
     return 9.81 * float(arm.mass[joint:].sum()) * reach
 
 
-def told_of(found: Diagnosis) -> list[tuple[tuple[Told, ...], float, str]]:
+def answers_of(found: Diagnosis) -> list[tuple[tuple[Told, ...], float, str]]:
     """Each answer with those tied with it, how sure it is stated, and its values in words."""
     out = list[tuple[tuple[Told, ...], float, str]]()
     if found.recording is not None:
@@ -137,7 +137,7 @@ def judged(own: Machine) -> dict[str, Any]:
     model = first_model(logs[0], "arm", CATALOGUE, ("arm.xml", own.arm.text))
     found = diagnose(model, *logs, catalogue=CATALOGUE)
     seconds = process_time() - begun
-    answers = told_of(found)
+    answers = answers_of(found)
     named = [any({*right} & {*told} for told, _, _ in answers) for right in own.right]
     for k, right in enumerate(own.right):
         if right[0][0] == FRICTION:  # of every joint it is fitted: its value says it

@@ -41,8 +41,8 @@ def measure() -> list[Figure]:
 
 def _of_drives() -> list[Figure]:
     """Resonances told of drives that have none, and of drives that have one."""
-    false = sum(bool(_told(seed, resonant=False)) for seed in range(MACHINES))
-    off = [x for seed in range(MACHINES) for x in _told(seed, resonant=True)]
+    false = sum(bool(_resonance_errors(seed, resonant=False)) for seed in range(MACHINES))
+    off = [x for seed in range(MACHINES) for x in _resonance_errors(seed, resonant=True)]
     wrong = sum(x > 0.01 for x in off)
     return [
         Figure("drives without a resonance: of these one is told", false / MACHINES, "1",
@@ -52,7 +52,7 @@ def _of_drives() -> list[Figure]:
     ]  # fmt: skip
 
 
-def _told(seed: int, *, resonant: bool) -> list[float]:
+def _resonance_errors(seed: int, *, resonant: bool) -> list[float]:
     """By how much each resonance that is told of a drive is off its own; 1 where it has none."""
     rng = np.random.default_rng([SEED, seed, int(resonant)])
     axis = drawn(rng, resonant, list(MOTIONS)[seed % len(MOTIONS)])

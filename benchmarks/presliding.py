@@ -52,14 +52,14 @@ def row(kind: str, noise: float, seed: int) -> Row:
     model = first_model({"training": training}, "contact", CATALOGUE)
     found = diagnose(model, training, selection, test, catalogue=CATALOGUE).axes["q"]
     spent = process_time() - begun
-    level, stiffness = _told(kind, model, training, selection)
+    level, stiffness = _estimates(kind, model, training, selection)
     values = Values(stiffness / contact.stiffness - 1.0, level / contact.coulomb - 1.0)
     expected = Expected((kind,), KIN, known=("stribeck",))
     case = f"{kind} {seed}, noise of {noise:.2%} of {contact.coulomb / contact.stiffness:.2g} m"
     return row_of(case, expected, found, spent) | asdict(values)
 
 
-def _told(kind: str, model: MachineModel, log: Log, holdout: Log) -> tuple[float, float]:
+def _estimates(kind: str, model: MachineModel, log: Log, holdout: Log) -> tuple[float, float]:
     """Level N and stiffness N/m at rest of the true law, added to a first model and fitted."""
     if kind == LAYERS:  # which are all of the friction
         viscous = Fitted.at_start(CATALOGUE["viscous_friction"])

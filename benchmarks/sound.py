@@ -140,10 +140,10 @@ def _zillen(path: Path) -> Log:
 
 def measure() -> list[Figure]:
     """The figures, and what is told of each log that is told of."""
-    return figures(list(_told(SEED)))
+    return figures(list(_check_findings(SEED)))
 
 
-def _told(seed: int) -> Iterator[tuple[str, str, tuple[LogFinding, ...]]]:
+def _check_findings(seed: int) -> Iterator[tuple[str, str, tuple[LogFinding, ...]]]:
     for name, log in simulated(seed):
         yield "simulated", name, check_log(log).findings
     if DATA.is_dir():
@@ -178,7 +178,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks sound", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED)
     given = parser.parse_args(arguments)
-    told = list(_told(given.seed))
+    told = list(_check_findings(given.seed))
     for _, name, findings in told:
         for finding in findings:
             print(f"{name}: {finding.severity.value}: {finding}", flush=True)

@@ -13,7 +13,7 @@ from identify.analysis.first_model import first_model as shown_by
 from identify.analysis.recording import Recording, misassigned
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import shortness
-from identify.dataset.preparation import datasets, tell_left_out, telling, those_told
+from identify.dataset.preparation import datasets, informative_logs, tell_left_out, telling
 from identify.dataset.prepared_log import sticks
 from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.alignment import aligned, fit_aligned
@@ -375,7 +375,7 @@ def feedforward(
     model, given = read.model, dict(read.training)  # each is read once
     before = None if before is None else as_model(before, catalogue)
     simulated = model if machine is None else as_model(machine, catalogue)
-    moved = those_told(given, {name: unmoved(model, log) for name, log in given.items()})
+    moved = informative_logs(given, {name: unmoved(model, log) for name, log in given.items()})
     found = tracking(simulated, model, before, moved, progress)
     return Feedforward(model, before, tuple(moved), found)
 
@@ -396,7 +396,7 @@ def frequency_response(
     """
     given = dict(logs_by_name(logs))  # each is read once
     machine = None if model is None else as_model(model, catalogue)
-    kept = those_told(given, {name: shortness(log) for name, log in given.items()})
+    kept = informative_logs(given, {name: shortness(log) for name, log in given.items()})
     return FrequencyResponse(tuple(kept), responses_of(kept, machine, progress))
 
 

@@ -87,7 +87,7 @@ def late_by(time: str, as_: Imitated) -> Knee:
     return at(time, "s", lambda e: (0.0, e.stroke), above=as_)
 
 
-def bends_at(speed: str, as_: Imitated) -> Knee:
+def at_speed(speed: str, as_: Imitated) -> Knee:
     """A speed between rest and the highest."""
     return at(speed, "m/s", lambda e: (e.speed_least, e.speed_max), as_, as_)
 

@@ -21,14 +21,14 @@ CONFIG = ConfigDict(
 )  # fmt: skip
 
 
-def unwrapped(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Arrays as lists, members of an enum by their values."""
     listed = value.tolist() if hasattr(value, "tolist") else value
     return listed.value if isinstance(listed, Enum) else listed
 
 
 def _known(value: Any) -> Any:
-    value = unwrapped(value)
+    value = plain_value(value)
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 else:
     Number = Annotated[float | None, BeforeValidator(_known)]
     """In the JSON null, where it is infinite or no number."""
-    Values = Annotated[list[Number], BeforeValidator(unwrapped)]
-    Flags = Annotated[list[bool], BeforeValidator(unwrapped)]
+    Values = Annotated[list[Number], BeforeValidator(plain_value)]
+    Flags = Annotated[list[bool], BeforeValidator(plain_value)]
     """Arrays (n,), in the JSON lists."""
 
     def computed(function):

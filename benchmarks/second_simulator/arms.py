@@ -210,7 +210,7 @@ def log_of(arm: Arm, changed: Changed, seed: int, duration: float = DURATION) ->
         applied = command - spring * (data.qpos - 0.2)
         level = dry * (1.0 + growth * np.abs(load))
         if arm.presliding:
-            bent = _bent(bent, stiff, level, data.qvel)
+            bent = _bristles(bent, stiff, level, data.qvel)
             applied = applied - bent
         elif growth.any():
             model.dof_frictionloss[:] = level
@@ -232,7 +232,7 @@ def log_of(arm: Arm, changed: Changed, seed: int, duration: float = DURATION) ->
     return Log(float(arm.rate), dict(zip(arm.joints, units, strict=True)))
 
 
-def _bent(bent: Array, stiff: Array, level: Array, velocity: Array) -> Array:
+def _bristles(bent: Array, stiff: Array, level: Array, velocity: Array) -> Array:
     """The friction (n,) of Dahl's law after a step at these velocities, exactly."""
     end, by = np.sign(velocity) * level, np.abs(velocity) * STEP * stiff / level
     return np.asarray(end + (bent - end) * np.exp(-by))

@@ -14,7 +14,7 @@ import numpy as np
 from identify.analysis.first_values import LENGTHS, FirstValues, first_values
 from identify.dataset.bodies import Bodies, bodies_along
 from identify.dataset.coordinates import excitation
-from identify.dataset.given_logs import is_driven, nothing_told, require_samples, telling_in
+from identify.dataset.given_logs import is_driven, none_informative, require_samples, telling_in
 from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, motion_of
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import TestFunction
@@ -60,7 +60,7 @@ def first_model(
     own = begun.axes if mass is None else _held(mass, logs, names, begun)
     told = {a: telling_in(logs, a, driven=is_driven(own.get(a))) for a in names}
     if not any(going for going, _ in told.values()):
-        raise nothing_told(names, logs.values(), (silent for _, silent in told.values()))
+        raise none_informative(names, logs.values(), (silent for _, silent in told.values()))
     taken = {n: bodies_along(begun, log, n) for n, log in logs.items()}
     axes = {
         a: _first_axis(going, a, {n: taken[n].get(a) for n in going}, own.get(a), catalogue)
@@ -143,7 +143,7 @@ def _held(
     }
 
 
-def _told(
+def _first_values(
     axis: str, logs: Mapping[str, Log], bodies: Mapping[str, Bodies | None], mass: float | None
 ) -> tuple[list[Motion], FirstValues]:
     """The motions of an axis in logs, and the values that they tell.
@@ -165,7 +165,7 @@ def _told(
 def values_of(log: Log, axis: str) -> FirstValues | None:
     """The first values of an axis of a log; None where it says nothing of them."""
     going, _ = telling_in({"the log": log}, axis)
-    return _told(axis, going, {}, None)[1] if going else None
+    return _first_values(axis, going, {}, None)[1] if going else None
 
 
 def _of_joints(begun: MachineModel, names: Sequence[str], file: str, text: str) -> MachineModel:
@@ -200,7 +200,7 @@ def _first_axis(
 ) -> AxisModel:
     """bodies: by log, of a joint. own: with its mass alone where that is known. InputError."""
     known = None if own is None or own.joint is not None else own.mass
-    motions, found = _told(axis, logs, bodies, known)
+    motions, found = _first_values(axis, logs, bodies, known)
     covered, units = excitation(motions, None), motions[0].units
     if own is None:
         if found.mass is None or _of_constant_force(motions):

@@ -83,11 +83,11 @@ def _logged(
     from twin.checks import check_assumed
     from twin.importers import told_of
     from twin.importers.guess import doubts_of
-    from twin.importers.proposal.doubts import told_in_log
+    from twin.importers.proposal.doubts import doubts_as_metadata
     from twin.logs import write_log
 
     unsure = [str(f) for axis in log.axes for f in check_assumed(axis, log.metadata)]
-    doubts = told_in_log(log)  # for whoever checks it later
+    doubts = doubts_as_metadata(log)  # for whoever checks it later
     write_log(replace(log, metadata={**log.metadata, **doubts}), out)
     answer = ImportAnswer.of(
         log=out, samples=len(log), sample_rate=log.sample_rate, map=mapping, proofs=proofs

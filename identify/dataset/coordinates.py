@@ -134,7 +134,7 @@ def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = No
         force_max=force,
         force_usual=float(np.median(driven[speed >= slow])),
         resolution=max(m.count for m in motions),
-        shortest=max(_told(m) for m in motions),
+        shortest=max(_least_change(m) for m in motions),
         both_ways=_both_ways(np.concatenate([m.position for m in motions]), velocity, fast),
         temperature=_temperature(motions),
         fewest_cycles=RULE.fewest_cycles,
@@ -158,7 +158,7 @@ def _temperature(motions: Sequence[Motion]) -> float:
     return float(np.mean(np.concatenate(logged))) if logged else Excitation.temperature
 
 
-def _told(motion: Motion) -> float:
+def _least_change(motion: Motion) -> float:
     """Least change of position, m rms, that readings tell from their rounding and their noise."""
     return float(max(motion.resolution / np.sqrt(12.0), motion.position_noise))
 

@@ -161,7 +161,7 @@ def require_moving(axis: str, moving: Collection[str]) -> None:
         raise InputError(f"axis {axis} does not move in the logs; give a log in which it does")
 
 
-def nothing_told(
+def none_informative(
     axes: Collection[str], logs: Collection[Log], silent: Iterable[Mapping[str, str]]
 ) -> InputError:
     """Why no training log says anything of an axis of a model, and what to do.

@@ -17,7 +17,7 @@ from identify.dataset.given_logs import (
     Given,
     apart,
     is_driven,
-    nothing_told,
+    none_informative,
     require_channels,
     require_one_kind,
     require_samples,
@@ -85,7 +85,7 @@ def _prepared(
             out[name].forget()  # the next axis needs the memory
         unused.append(found[Role.TRAINING][1])
     if not out:
-        raise nothing_told(model.axes, given[Role.TRAINING].values(), unused)
+        raise none_informative(model.axes, given[Role.TRAINING].values(), unused)
     return out
 
 
@@ -191,7 +191,7 @@ def telling(dataset: Dataset, sticks: bool, parameters: int = 0) -> Dataset:
     """The dataset less the logs without a test function that counts; each is told in one line.
 
     sticks: whether the axis has static friction, whose force at rest the motion does not determine.
-    parameters: how many are to be fitted. Raises InputError as ``require_told`` does.
+    parameters: how many are to be fitted. Raises InputError as ``require_informative`` does.
     """
     silent = {
         log.motion.name: _why(log, dataset.axis)
@@ -202,7 +202,7 @@ def telling(dataset: Dataset, sticks: bool, parameters: int = 0) -> Dataset:
     fit, holdout, test = (
         tuple(log for log in dataset.having(role) if log.motion.name not in silent) for role in Role
     )
-    require_told(dataset, sticks, parameters)
+    require_informative(dataset, sticks, parameters)
     left_out = {**dataset.left_out, **silent}
     tell_left_out(left_out)
     return replace(dataset, training=fit, selection=holdout, test=test, left_out=left_out)
@@ -214,7 +214,7 @@ def tell_left_out(logs: Mapping[str, str]) -> None:
         tell(f"{name} is left out: {why}")
 
 
-def those_told(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:
+def informative_logs(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[str, Log]:
     """The logs without a reason to leave them out; the others are told. InputError where all are.
 
     why: by name.
@@ -226,7 +226,7 @@ def those_told(logs: Mapping[str, Log], why: Mapping[str, str | None]) -> dict[s
     return {name: log for name, log in logs.items() if name not in left_out}
 
 
-def is_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> bool:
+def is_informative(dataset: Dataset, sticks: bool, parameters: int = 0) -> bool:
     """Whether the training logs say more than so many numbers.
 
     A fit of as many parameters would leave nothing, and prove nothing. sticks: as ``telling`` has
@@ -235,9 +235,9 @@ def is_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> bool:
     return independent(dataset.training, sticks) > parameters
 
 
-def require_told(dataset: Dataset, sticks: bool, parameters: int = 0) -> None:
+def require_informative(dataset: Dataset, sticks: bool, parameters: int = 0) -> None:
     """Raise InputError where they do not."""
-    if is_told(dataset, sticks, parameters):
+    if is_informative(dataset, sticks, parameters):
         return
     logs, told = dataset.training, independent(dataset.training, sticks)
     why = _why(logs[0], dataset.axis)

@@ -84,7 +84,7 @@ class PreparedLog:
         return np.asarray((position >= low) & (position <= high))
 
     @property
-    def told(self) -> Array:
+    def informative_share(self) -> Array:
         """How much of each test function (n,) tells of a model: not what balances by itself."""
         slip = self.motion.slip
         if slip is None:

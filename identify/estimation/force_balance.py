@@ -290,7 +290,7 @@ def changes(
     out = _walked(axis, logs, where, steps, every if _borne(axis) else asked)
     if _borne(axis):
         out = (out + _by_load(axis, logs, where, steps, out))[:, asked]
-    out *= np.concatenate([log.told for log in logs])[asked]
+    out *= np.concatenate([log.informative_share for log in logs])[asked]
     gain = motor_gain(axis, logs)
     driving = [j for j, c in enumerate(where) if _drives(axis, c)]
     left = unbalanced(axis, logs)[asked] if driving else 0.0

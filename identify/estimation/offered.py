@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.preparation import is_told, require_told, telling
+from identify.dataset.preparation import is_informative, require_informative, telling
 from identify.dataset.prepared_log import sticks
 from twin.effect import Effect
 from twin.effects import Catalogue
@@ -61,8 +61,8 @@ def require_shown(effect: Effect, axes: Mapping[str, tuple[AxisModel, Dataset]])
             )
     own = {n: axis.with_effect(Fitted.at_start(effect)) for n, (axis, _) in axes.items()}
     asked = {n: (axes[n][1], sticks(axis), fitted_count(axis)) for n, axis in own.items()}
-    if not (shown := [n for n, each in asked.items() if is_told(*each)]):
-        require_told(*next(iter(asked.values())))
+    if not (shown := [n for n, each in asked.items() if is_informative(*each)]):
+        require_informative(*next(iter(asked.values())))
     return shown
 
 
@@ -72,7 +72,7 @@ def _shows(axis: AxisModel, dataset: Dataset, effect: Effect) -> bool:
         return False
     if not effect.sticks or sticks(axis):
         return True
-    return is_told(dataset, True, fitted_count(axis))
+    return is_informative(dataset, True, fitted_count(axis))
 
 
 def is_logged(effect: Effect, dataset: Dataset) -> bool:

@@ -70,7 +70,7 @@ class Departures:
 
         def tied(name: str) -> list[str]:
             alike = (m.tied for m in own if name in laws and m.group.what.covers(laws[name]))
-            return [self.told(group) for groups in alike for group in groups]
+            return [self.named(group) for groups in alike for group in groups]
 
         findings = tuple(
             replace(f, tied=tuple(dict.fromkeys((*f.tied, *tied(f.effect)))))
@@ -90,7 +90,9 @@ class Departures:
             return ()
         gains = [g for g in self.groups if g.what is What.GAIN]
         moved = self._corrected
-        told = _Told.of(_regression(_all_on_beginnings(fits, datasets), [*moved, *gains]), moved)
+        told = _Estimated.of(
+            _regression(_all_on_beginnings(fits, datasets), [*moved, *gains]), moved
+        )
         return tuple(
             replace(
                 body, change=body.change + told.changes[body.body],
@@ -148,7 +150,7 @@ class Departures:
             if g.what is What.BODY or not has_it(g)
         ]
 
-    def told(self, group: Group) -> str:
+    def named(self, group: Group) -> str:
         """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
         return f"{self.names[group.what]} of {group.place}"
 
@@ -223,7 +225,7 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
     own = [m for m in found.moved if m.group.what is What.BODY]
     if not own:
         return found
-    told = _Told.of(regression, [m.group for m in found.moved])
+    told = _Estimated.of(regression, [m.group for m in found.moved])
     datasets = dict(found.datasets)
     for m in own:
         assert m.group.body is not None
@@ -234,19 +236,19 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
     datasets = {a: dataset for a, (dataset, _) in again.items()}
     fits = {a: replace(fit, begun=found.fits[a].begun) for a, (_, fit) in again.items()}
     errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
-    bodies = tuple(_told_of(found, m, told, errors) for m in own)
+    bodies = tuple(_wrong_body(found, m, told, errors) for m in own)
     return replace(found, datasets=datasets, fits=fits, bodies=bodies)
 
 
-def _told_of(
-    found: Departures, moved: Moved, told: _Told, errors: Mapping[str, Errors]
+def _wrong_body(
+    found: Departures, moved: Moved, told: _Estimated, errors: Mapping[str, Errors]
 ) -> WrongBody:
     body, name = moved.group.body, moved.group.place
     assert body is not None
     return WrongBody(
         body=name,
         axis=body.axis,
-        tied=tuple(g.place if g.body else found.told(g) for g in moved.tied),
+        tied=tuple(g.place if g.body else found.named(g) for g in moved.tied),
         axes=tuple(axis for axis in body.axes if axis in errors),
         inertial=body.inertial,
         change=told.changes[name],
@@ -258,7 +260,7 @@ def _told_of(
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _Estimated:
     """What a regression tells of bodies, by name.
 
     Changes (10,), half their 90 % bands (10,), and the logs that tell another change.
@@ -269,7 +271,7 @@ class _Told:
     disagreeing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, regression: Regression, moved: Sequence[Group]) -> _Told:
+    def of(cls, regression: Regression, moved: Sequence[Group]) -> _Estimated:
         """Beside all that moved. The bands are by the scatter between stretches of time.
 
         Of all joints together. Where the logs ask for other torque constants, which no file knows

@@ -309,7 +309,7 @@ def _with_torques(plain: Regression) -> Regression:
     others = [g for g, group in enumerate(plain.groups) if group.what is not What.GAIN]
     joints = {axis: k for k, axis in enumerate(dict.fromkeys(g.axis for g in plain.groups))}
 
-    def told(rows: Rows, found: Solution) -> Rows:
+    def with_prediction(rows: Rows, found: Solution) -> Rows:
         predicted = rows.torque + (rows.force - rows.columns @ found.values)
         columns = rows.columns.copy()
         for group, span in zip(plain.groups, plain.spans, strict=True):
@@ -321,7 +321,7 @@ def _with_torques(plain: Regression) -> Regression:
     # At first the other groups alone tell it, in part as the gain has it; then all of them do.
     for asked in (others, range(len(plain.groups))):
         found = plain.solved(asked)
-        training, other = (told(rows, found) for rows in (plain.training, plain.other))
+        training, other = (with_prediction(rows, found) for rows in (plain.training, plain.other))
         plain = replace(plain, training=training, other=other)
     return plain
 

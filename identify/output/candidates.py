@@ -73,8 +73,7 @@ class Column:
     line: Callable[[CandidateRow, DisplayUnit], str] | None = None
 
 
-def _errors(row: CandidateRow, _: DisplayUnit) -> str:
-    unit = DisplayUnit.of(row.unit, row.holdout_error_before)
+def _errors(row: CandidateRow, unit: DisplayUnit) -> str:
     return "   " + " -> ".join(change(row.holdout_error_before, row.holdout_error_after, unit))
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.preparation import is_told
+from identify.dataset.preparation import is_informative
 from identify.dataset.prepared_log import moving, sticks
 from identify.dataset.time_scale import AtLength
 from identify.estimation.alignment import fit_aligned, realigned
@@ -95,7 +95,7 @@ def _telling(length: float, found: Found, catalogue: Catalogue) -> Dataset | Non
         return None
     still = sticks(axis) or any(e.sticks for e in catalogue.values())
     each = all(moving([log], still).any() for log in dataset.logs)
-    return dataset if each and is_told(dataset, still, fitted_count(axis)) else None
+    return dataset if each and is_informative(dataset, still, fitted_count(axis)) else None
 
 
 def _asked(length: float, base: Judged, catalogue: Catalogue, progress: Progress) -> Conclusion:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.preparation import datasets, is_told, telling
+from identify.dataset.preparation import datasets, is_informative, telling
 from identify.dataset.prepared_log import PreparedLog, sticks
 from identify.estimation.alignment import aligned
 from identify.estimation.force_balance import effect_forces, unbalanced
@@ -108,7 +108,7 @@ def replay(model: MachineModel | None, log: Log, name: str) -> Replay:
             "give the model of this machine, or none"
         )
     found = datasets(model, {name: log}, {})
-    told = {a: d for a, d in found.items() if is_told(d, sticks(model.axes[a]))}
+    told = {a: d for a, d in found.items() if is_informative(d, sticks(model.axes[a]))}
     parts = {}
     for axis, dataset in (told or found).items():
         own = model.axes[axis]

@@ -156,11 +156,11 @@ def fit_dynamics(force: Array, regressors: Array, kept: Array, first: int, rare:
     explains = float(np.std(residual[use])) < 0.3 * spread  # residual as a part of the command
     mass = float(gains[0] / size[0]) if size[0] > 0.0 else 0.0
     share = float(np.std(gains[0] * scaled[use, 0])) / spread if spread > 0.0 else 0.0
-    told = _is_told(scaled[use])
+    told = _is_independent(scaled[use])
     return Dynamics(mass if told else None, explains, share, residual, first)
 
 
-def _is_told(scaled: Array) -> bool:
+def _is_independent(scaled: Array) -> bool:
     """Whether the first of some columns (m, k) is none of the sums of the others."""
     first, others = scaled[:, 0], scaled[:, 1:]
     left = first - others @ np.linalg.lstsq(others, first, rcond=1e-12)[0]

@@ -94,14 +94,14 @@ def check_files(paths: Sequence[Path]) -> dict[str, CheckReport]:
     for path in paths:
         logs[str(path)], reports[str(path)] = read_checked(path, COMPARED, every)
         require_intact(path)
-    told = [(copy.copy, _told(copy)) for copy in copies(logs)]
+    told = [(copy.copy, _copy_finding(copy)) for copy in copies(logs)]
     for name, finding in (*told, *differences(logs)):
         findings = reports[name].findings
         reports[name] = replace(reports[name], findings=(*findings, finding))
     return reports
 
 
-def _told(copy: Copy) -> LogFinding:
+def _copy_finding(copy: Copy) -> LogFinding:
     remedy = "it proves nothing of a fit to that, and fitted beside it counts twice: leave it out"
     return LogFinding(Severity.ERROR, Fault.COPY, copy.axis, str(copy), WHOLE, remedy)
 

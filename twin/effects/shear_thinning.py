@@ -9,7 +9,7 @@ axis has, so it never gives energy.
 
 from twin.effect import LEAST, MOST, VISCOUS, Effect, Kind, Parameter, V
 from twin.knee import Imitated
-from twin.law_parts import bends_at
+from twin.law_parts import at_speed
 
 
 def law(p, s, io):
@@ -32,7 +32,7 @@ EFFECT = Effect(
         ),
     ),
     law=law,
-    knees=(bends_at("vt", Imitated.OF_SPEED),),
+    knees=(at_speed("vt", Imitated.OF_SPEED),),
     fingerprint="residual follows the lowest and the highest speeds, and opposes those between",
     excited_by="passes at several constant speeds, from the lowest to the highest",
 )  # fmt: skip

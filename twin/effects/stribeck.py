@@ -21,7 +21,7 @@ from twin.law_parts import (
     STRIBECK_EXPONENT,
     STRIBECK_VELOCITY,
     VISCOUS_PART,
-    bends_at,
+    at_speed,
     dry_and_viscous,
     stribeck_level,
 )
@@ -58,7 +58,7 @@ EFFECT = Effect(
     states=("at_rest",),
     sticks=True,
     law=law,
-    knees=(bends_at("v0", Imitated.DRY_FRICTION),),
+    knees=(at_speed("v0", Imitated.DRY_FRICTION),),
     joint_attributes=dry_and_viscous,
     curves=STRIBECK_CURVES,
     fingerprint="residual rises below the Stribeck velocity, with the sign of the direction",

@@ -109,7 +109,7 @@ class BadCells:
         if not cells:
             return
         cells = sorted(cells + self._not_finite, key=lambda cell: (cell[0].line, cell[1]))
-        told = [self._told(row, k) for row, k in cells[:MOST_NAMED]]
+        told = [self._cell_reason(row, k) for row, k in cells[:MOST_NAMED]]
         if len(told) == 1:
             raise InputError(f"{told[0]}{_remedy(cells[0][0].cell(cells[0][1]))}")
         more = f"; and {len(cells) - MOST_NAMED} more" if len(cells) > MOST_NAMED else ""
@@ -120,7 +120,7 @@ class BadCells:
             "their rows, or state header_line, delimiter or decimal in the map"
         )
 
-    def _told(self, row: Row, column: int) -> str:
+    def _cell_reason(self, row: Row, column: int) -> str:
         cell = row.cell(column)
         what = f"{cell!r} is not" if cell else "is empty"
         return f"line {row.line}, column '{self._names[column]}': {what}"

@@ -65,7 +65,7 @@ def unwrapped(column: Array, size: float) -> Array:
     return np.asarray(plain - size * np.rint(plain[:1] / size))
 
 
-def clock_jumps(times: Array, sizes: tuple[float, ...]) -> Wraps | None:
+def stamp_jumps(times: Array, sizes: tuple[float, ...]) -> Wraps | None:
     """Where times (n,) jump by one of these sizes, back or on, and would be even but for it.
 
     None where no jump is by any of them to within the usual steps.

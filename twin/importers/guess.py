@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.clock import find_clock
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.proposal.axes import axes_of
@@ -35,6 +34,7 @@ from twin.importers.proposal.text import (
     needs_of,
     why_not,
 )
+from twin.importers.stated_time_base import find_time_base
 from twin.importers.table import SignalTable, numbers
 from twin.importers.units import find_unit, is_unit
 from twin.logs.container import reading
@@ -147,19 +147,19 @@ def propose(path: Path) -> Proposal:
         columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
-    clock = find_clock(table, columns)
-    moving = {n: c for n, c in columns.items() if n not in clock.used and np.ptp(c) > 0.0}
-    known = not clock.missing
-    file = File(names_of([*moving]), columns_of(moving), clock.step if known else None)
+    stated = find_time_base(table, columns)
+    moving = {n: c for n, c in columns.items() if n not in stated.used and np.ptp(c) > 0.0}
+    known = not stated.missing
+    file = File(names_of([*moving]), columns_of(moving), stated.step if known else None)
     axes = tuple(_axis(file, a, names) for a, names in axes_of(file.names, file.columns).items())
-    used = {*clock.used, *(c for axis in axes for c in axis.columns)}
-    taken = {*clock.used, *(s.column for axis in axes for s in axis.signals.values())}
+    used = {*stated.used, *(c for axis in axes for c in axis.columns)}
+    taken = {*stated.used, *(s.column for axis in axes for s in axis.signals.values())}
     left = {n: c for n, c in table.columns.items() if n not in used}
     others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
     tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
     missing = {n: hole for n, hole in holes.items() if n in taken}
-    return Proposal(path.name, file, axes, (head, *clock.lines), tail, missing, clock.missing)
+    return Proposal(path.name, file, axes, (head, *stated.lines), tail, missing, stated.missing)
 
 
 def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
@@ -212,7 +212,9 @@ def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
             continue
         again = name.endswith("]") and (name.rpartition("[")[0], values.tobytes()) in named
         finite = np.flatnonzero(np.isfinite(column))
-        if len(column) > 2 and 2 * len(finite) > len(column) and not again:  # else of another clock
+        if (
+            len(column) > 2 and 2 * len(finite) > len(column) and not again
+        ):  # else of another stated
             if hole := table.hole(name, column):
                 holes[name] = hole
                 column = np.interp(np.arange(len(column)), finite, column[finite])

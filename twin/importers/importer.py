@@ -152,7 +152,9 @@ class _Recording:
         except InputError as error:
             own = mapping.time.name
             rows = len(self.table.columns[own])
-            clocks = {n: c for n, c in self.table.clocks.items() if len(c) == rows and n != own}
+            clocks = {
+                n: c for n, c in self.table.calendar_times.items() if len(c) == rows and n != own
+            }
             others = [name for name, c in clocks.items() if _rises(c)]
             hint = f"; the times of '{others[0]}' rise: take these" if others else ""
             raise InputError(f"{error}{hint}") from error

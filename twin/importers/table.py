@@ -45,7 +45,7 @@ class SignalTable:
     notes: tuple[str, ...] = ()
 
     @property
-    def clocks(self) -> Mapping[str, NDArray]:
+    def calendar_times(self) -> Mapping[str, NDArray]:
         """Its columns that are times of a calendar."""
         return {name: c for name, c in self.columns.items() if np.asarray(c).dtype.kind == "M"}
 
@@ -94,7 +94,7 @@ class SignalTable:
 
     def _message(self, name: str, row: int) -> str | None:
         """Which message of a bag a row is; None where the table is of none."""
-        for clock, times in self.clocks.items():
+        for clock, times in self.calendar_times.items():
             prefix, _, field = clock.rpartition(".")
             if field == "log_time" and name.startswith(f"{prefix}.") and row < len(times):
                 since = times[row] - times[0]

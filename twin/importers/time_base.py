@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.importers.counters import and_more, clock_jumps, without_jumps
+from twin.importers.counters import and_more, stamp_jumps, without_jumps
 from twin.importers.mapping import ImportMap
 from twin.importers.table import MOST_NAMED, numbers
 from twin.logs.log import Array
@@ -30,7 +30,7 @@ def times_of(name: str, raw: NDArray, unit: float) -> tuple[Array, tuple[str, ..
     times = unit * numbers(name, raw)
     calendar = raw.dtype.kind in "Mm"
     sizes = (_HOUR, _DAY, 0.5 * _DAY) if calendar else (*(n * unit for n in _TIMERS), _DAY)
-    if not np.isfinite(times).all() or (jumps := clock_jumps(times, sizes)) is None:
+    if not np.isfinite(times).all() or (jumps := stamp_jumps(times, sizes)) is None:
         return times, ()
     row = int(jumps.rows[0])
     shown = [_shown(raw[k]) for k in (row - 2, row - 1)]

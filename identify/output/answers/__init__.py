@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_core import to_jsonable_python
 
-from twin.record import unwrapped
+from twin.record import plain_value
 
 SCHEMA = "answers-1"  # the number grows when an entry goes, or gets another meaning
 File = Annotated[str, BeforeValidator(lambda v: str(v) if isinstance(v, Path) else v)]  # as typed
@@ -65,7 +65,7 @@ class Entry(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _of_array_or_enum(cls, value: Any) -> Any:
-        return unwrapped(value)
+        return plain_value(value)
 
     @classmethod
     def of(cls, *sources: object, **given: Any) -> Self:

@@ -12,10 +12,10 @@ from dialect_files import COUNT, SAMPLES, STEP, F, Q
 from import_cases import mapping
 
 from twin.errors import InputError
-from twin.importers.clock import find_clock
 from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.importer import import_log, table_of, told_of
 from twin.importers.mapping import EVERY_COLUMN
+from twin.importers.stated_time_base import find_time_base
 from twin.importers.table import numbers
 
 BAGS = ("mcap",)  # of which whole chunks are read
@@ -65,7 +65,7 @@ def test_its_rate_is_read_or_asked_for_and_never_another(tmp_path, name):
     table = table_of(path, EVERY_COLUMN)
     columns = {n: numbers(n, c) for n, c in table.columns.items()
                if len(c) == COUNT and np.asarray(c).dtype.kind != "U"}  # fmt: skip
-    clock = find_clock(table, columns)
+    clock = find_time_base(table, columns)
     if SAMPLES[name].asks:
         assert clock.missing
         assert not [line for line in clock.lines if not line.startswith("#")]

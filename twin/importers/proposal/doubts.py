@@ -24,10 +24,10 @@ def motion_of_force(axis: AxisLog) -> Explained | None:
 
 def doubts_of_log(log: Log) -> Iterator[str]:
     """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each."""
-    return iter(told_in_log(log).values())
+    return iter(doubts_as_metadata(log).values())
 
 
-def told_in_log(log: Log) -> dict[str, str]:
+def doubts_as_metadata(log: Log) -> dict[str, str]:
     """The same as entries of the log's metadata, "doubt.x.0", which a check reads.
 
     "partial.x" where a part of the force of an axis is missing for sure: it does work on friction,

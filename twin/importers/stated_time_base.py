@@ -49,7 +49,7 @@ NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is th
 
 
 @dataclass(frozen=True)
-class Clock:
+class StatedTimeBase:
     """The time base of a file.
 
     lines: of a map. step: s a sample, NOMINAL where it is not known. used: the columns that tell
@@ -95,11 +95,13 @@ class _Times:
         return f'{{column = {column}, unit = "{self.unit}"}}'
 
 
-def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
+def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTimeBase:
     """The time base of a table; columns: those of numbers (n,), all as long."""
     if table.sample_rate is not None:
         line = f"# the file states its sample rate: {table.sample_rate:g} Hz"
-        return Clock((line,), 1.0 / table.sample_rate, tuple(n for n in columns if is_time(n)))
+        return StatedTimeBase(
+            (line,), 1.0 / table.sample_rate, tuple(n for n in columns if is_time(n))
+        )
     counters = [name for name, column in columns.items() if counts(name, column)]
     called, even = _candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])
@@ -111,7 +113,7 @@ def find_clock(table: SignalTable, columns: Mapping[str, Array]) -> Clock:
         return _of_times(found, columns, stated, used)
     if stated is not None and stated.rate is not None:
         lines = _of_rate(columns, counters, stated.rate, f"the file states {stated.text!r}")
-        return Clock(lines, 1.0 / stated.rate, used)
+        return StatedTimeBase(lines, 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
 
 
@@ -227,7 +229,7 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
 def _of_times(
     found: Sequence[_Times], columns: Mapping[str, Array], stated: StatedRate | None,
     used: tuple[str, ...],
-) -> Clock:  # fmt: skip
+) -> StatedTimeBase:  # fmt: skip
     """The time base by the best of several columns of times."""
     time, why = _best(found)
     lines = []
@@ -235,10 +237,10 @@ def _of_times(
     if coarse is not None:
         rows = f"each time of {time.name} is that of {coarse * time.step:.4g} rows"
         lines.append(f"sample_rate = {coarse:.6g} # Hz: {rows}")
-        return Clock(tuple(lines), 1.0 / coarse, used)
+        return StatedTimeBase(tuple(lines), 1.0 / coarse, used)
     if (rounded := rate_of_rounded(time.seconds)) is not None:
         line = f"sample_rate = {rounded:.9g} # Hz: so many rows a second by {time.name}, which is"
-        return Clock((f"{line} rounded",), 1.0 / rounded, used)
+        return StatedTimeBase((f"{line} rounded",), 1.0 / rounded, used)
     step = time.step / find_unit(time.unit, "s").size
     lines.append(f"time = {time.entry} # rises by {step:.6g} {time.unit}: {time.reason}{why}")
     lines += [f"# {text}" for text in time.said]
@@ -263,7 +265,7 @@ def _of_times(
         )
     if stated and stated.rate and abs(stated.rate * time.step - 1.0) > _OFF:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
-    return Clock(tuple(lines), time.step, used)
+    return StatedTimeBase(tuple(lines), time.step, used)
 
 
 def _best(found: Sequence[_Times]) -> tuple[_Times, str]:
@@ -296,7 +298,7 @@ def _scalars(table: SignalTable) -> Iterator[str]:
 def _asked(
     columns: Mapping[str, Array], counters: Sequence[str], stated: StatedRate | None,
     used: tuple[str, ...],
-) -> Clock:  # fmt: skip
+) -> StatedTimeBase:  # fmt: skip
     """The lines that ask for a time base."""
     unit = "" if stated is None else f"; the file states {stated.text!r} without a unit"
     lines = []
@@ -311,12 +313,12 @@ def _asked(
             if count.lost:
                 lines.append(_BRIDGED)
             said = f"{why}{unit}; give step (s a count): time = {{column = {column}, step = ...}}"
-            return Clock(tuple(lines), NOMINAL, used, (said,))
+            return StatedTimeBase(tuple(lines), NOMINAL, used, (said,))
         break
     else:
         why = "no column rises as times do"
     line = f"# sample_rate = ? # Hz: NOT KNOWN, {why}{unit}"
-    return Clock((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
+    return StatedTimeBase((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
 
 
 def _of_rate(
