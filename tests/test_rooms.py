@@ -28,6 +28,9 @@ TWIN_ROOMS = (
     "experiments", "simulation", "export", "schemas", "examples",
 )  # fmt: skip
 LOG_ROOMS = {"logs", "importers", "checks"}
+# Where it is decided what is told.
+DECIDING = ROOMS[ROOMS.index("dataset") : ROOMS.index("results")]
+PLAIN_NUMBERS = {0.5, 12.0, 100.0, 1000.0}
 MOST_FLOORS = 11  # the table of rules is the lowest: what is decided in a dataset is in it too
 # Functions that tell what a model or a result holds, without its logs.
 READING = {"followed", "nonparametric_labels"}
@@ -216,3 +219,39 @@ def words(path: Path) -> Iterator[object]:
         elif isinstance(node, ast.alias | ast.ImportFrom):
             named = node.name if isinstance(node, ast.alias) else node.module or ""
             yield named.split(".")[-1]
+
+
+def unexplained_numbers(path: Path) -> Iterator[str]:
+    """Numbers of a module that decide something, where no comment in or above the statement is.
+
+    Small integers, a half and what converts units decide nothing; defaults are in the docstring.
+    """
+    lines = path.read_text(encoding="utf-8").splitlines()
+
+    def asked(node: ast.AST, first: int, last: int) -> Iterator[str]:
+        if isinstance(node, ast.stmt):
+            body = getattr(node, "body", None)
+            heads = [node.lineno, *(d.lineno for d in getattr(node, "decorator_list", ()))]
+            first, last = min(heads), body[0].lineno - 1 if body else node.end_lineno or 0
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            value, said = abs(node.value), any("#" in line for line in lines[first - 2 : last])
+            small = float(value).is_integer() and value <= 10
+            if not (small or value in PLAIN_NUMBERS or said):
+                yield f"{path.name}:{node.lineno}: {node.value}"
+        for inner in ast.iter_child_nodes(node):
+            if not isinstance(inner, ast.arguments):
+                yield from asked(inner, first, last)
+
+    yield from asked(parsed(path), 1, 1)
+
+
+@pytest.mark.parametrize("deciding", DECIDING)
+def test_a_number_that_decides_has_its_reason_beside_it(deciding: str) -> None:
+    paths = (p for n, p in modules(IDENTIFY).items() if room(n) == deciding)
+    assert not [found for path in paths for found in unexplained_numbers(path)]
+
+
+def test_a_number_without_a_reason_is_seen(tmp_path: Path) -> None:
+    path = tmp_path / "deciding.py"
+    path.write_text("def odd(x):\n    if x > 0.66:\n        return 2 * x\n    return x  # 0.7\n")
+    assert [*unexplained_numbers(path)] == ["deciding.py:2: 0.66"]

@@ -68,8 +68,8 @@ def first_values(motions: Sequence[Motion], mass: float | None = None) -> FirstV
         columns, force = _both_ways(*_rows(motions, length, place))
         columns = _without_image(columns)
         found = _with_friction(columns, force)
-        # of the force's RMS; below, friction that is not known hides the inertia
-        least_inertial = 0.005
+        least_inertial = 0.005  # of the force's RMS; below, unknown friction hides the inertia
+        # 1e-300: of an axis that does not move, no division by zero
         least = least_inertial * float(np.std(force)) / max(float(np.std(columns[0])), 1e-300)
         if (told := found.sure("mass")) > least:
             return _values(motions, place, found, told)
@@ -187,6 +187,7 @@ def _regressed(columns: Array, force: Array) -> Regression:
     size = np.linalg.norm(columns, axis=1)
     size = np.where(size > 0.0, size, 1.0)
     scaled = columns / size[:, None]
+    # 1e-10, below which a combination of columns is rounding
     inverse = np.linalg.pinv(scaled @ scaled.T, rcond=1e-10, hermitian=True)
     gains = inverse @ scaled @ force
     left = force - gains @ scaled

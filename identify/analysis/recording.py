@@ -136,6 +136,7 @@ class Balance:
 
         Between reversals: there a friction with a memory looks like an inertia that is less.
         """
+        # 0.999 of a step in one direction, as a mean of signs tells it
         going = np.abs(self.columns[1]) > 0.999
         asked = (self.torque - self.bodies)[going]
         beside = np.vstack([self.columns, np.ones_like(self.torque)])[:, going].T
@@ -332,7 +333,7 @@ def _thinned(log: Log, joints: int) -> Log:
 
     240 s of all joints together tell it, in steps of 5 ms: a force is that of all of a step.
     """
-    seconds, step = 240.0, 0.005
+    seconds, step = 240.0, 0.005  # as above
     every = max(round(step / log.period), 1)
     count = min(round(seconds / joints / log.period), len(log)) // every
     axes = {}

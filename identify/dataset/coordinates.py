@@ -109,6 +109,7 @@ def covered(motions: tuple[Motion, ...], travel: tuple[float, float] | None = No
     velocity = np.concatenate([m.velocity for m in motions])
     command = np.concatenate([m.net for m in motions])
     speed = np.abs(velocity)
+    # 0.02 of the fastest: slower, friction is not told from what else acts
     fast = 0.02 * speed.max()
     ahead, behind = command[velocity > fast], command[velocity < -fast]
     if len(ahead) and len(behind):

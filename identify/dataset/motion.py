@@ -272,6 +272,7 @@ class Motion:
         past = sliding_window_view(bend[: len(command)], lags)
         scale = np.sqrt(np.mean(past**2)) or 1.0
         rows, wanted = past / scale, command[lags - 1 :]
+        # 1e-12, below which a combination of readings is rounding
         gains = np.linalg.lstsq(rows.T @ rows, rows.T @ wanted, rcond=1e-12)[0]
         left = usual_size(wanted - rows @ gains)
         return 2.0 * self.sample_period * left**2 / 6.0

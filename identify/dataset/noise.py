@@ -133,6 +133,7 @@ def noise_of(axis: AxisModel, motion: Motion, fastest: float | None = None) -> N
     return Noise(frequency, force, most, reading, bend, segment, max(more - force, 0.0), scatter)
 
 
+# 16: more than a search asks by turns
 @lru_cache(maxsize=16)
 def _hung_gain(hung: AxisModel, period: float, lines: int, speed: float) -> Array:
     """Power (lines,) of the force that an acceleration of the axis takes, over that of its mass.
@@ -155,6 +156,7 @@ def _hung_gain(hung: AxisModel, period: float, lines: int, speed: float) -> Arra
     alone = np.fft.rfft(hung.mass * rate(velocity, period))
     taken = alone - np.fft.rfft(force[0])
     lowest = slice(0, (lines - 1) * long + 1)
+    # 1e-300: no division by the zero at 0 Hz
     power = np.abs(taken[lowest]) ** 2 / np.maximum(np.abs(alone[lowest]) ** 2, 1e-300)
     means = np.add.reduceat(power[long // 2 :], np.arange(0, len(power) - long // 2, long)) / long
     return np.concatenate([power[:1], means])[:lines]

@@ -235,6 +235,7 @@ def _within_room(left: Array, noise: Noise, log: PreparedLog) -> Noise:
     passed = np.interp(frequency, noise.frequency, response)
     own = np.interp(frequency, noise.frequency, noise.reading * noise.bend)
     room = np.maximum(power / (told * passed) - own, 0.0)
+    # 0.25 of the power, half of the size: beyond, the test functions pass little
     top = float(frequency[np.flatnonzero(passed < 0.25 * passed[0])[0]])
     white = float(room[(frequency > 0.5 * top) & (frequency <= top)].mean())
     if noise.folded == 0.0:

@@ -241,6 +241,7 @@ def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
         mask = np.ones(len(log), bool) if log.reach == EVERYWHERE else log.reached
         if sticks:
             still = stands(log.motion).astype(float)
+            # 0.02 of a test function, as at a reversal without a rest
             mask &= log.test_function.mean(still) < 0.02
         masks.append(mask)
     return np.concatenate(masks)

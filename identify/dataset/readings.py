@@ -45,13 +45,15 @@ def resolution_of(moved: Array) -> float:
     fewest = 0.01  # of the samples, at which a reading must change to tell a step
     bins = 4096  # of differences, in the first three multiples of the coarsest step
     moved = moved[:ENOUGH]
+    # 70: squared binomials of a fourth difference, summed; 3.5 = 7/2, as above
     noise = float(np.sqrt(np.mean(np.diff(moved, 3) ** 2) / 70.0)) if len(moved) > 3 else 0.0
-    coarsest = noise * np.sqrt(3.5 / fewest)
+    coarsest = noise * np.sqrt(3.5 / fewest)  # m
     apart = np.abs(np.diff(moved))
+    # 3.5 steps hold three multiples and the half beyond
     near = apart[apart < 3.5 * coarsest]
     if len(near) <= fewest * len(apart):
         return 0.0
-    width = 3.5 * coarsest / (bins - 1)
+    width = 3.5 * coarsest / (bins - 1)  # m
     counts = np.bincount(np.rint(near / width).astype(int), minlength=bins)
     gathered = np.fft.rfft(counts, 8 * bins).real / len(near)
     cycles = np.asarray(np.fft.rfftfreq(8 * bins, width))[1:-1]
@@ -64,6 +66,7 @@ def resolution_of(moved: Array) -> float:
 
 def _refined(apart: Array, step: float) -> float:
     """A step by more and more of its multiples among distances (n,) m; 0 where they are none."""
+    # steps: of one multiple, of four, of sixteen, between which none is confused
     for reach in (1.5, 4.5, 16.5):
         near = apart[(apart > 0.5 * step) & (apart < reach * step)]
         if len(near):
@@ -187,6 +190,7 @@ def _waves(readings: Array, period: float) -> Array:
 
 def _gains(columns: Array, wanted: Array) -> Array:
     return np.asarray(
+        # 1e-9, below which a column is a combination of others
         np.linalg.lstsq(columns.T @ columns, columns.T @ wanted, rcond=1e-9)[0], float
     )
 

@@ -26,7 +26,7 @@ from identify.rules import RULE
 from twin.parallel import spread
 from twin.signals import Array
 
-MOST_LINES = 24
+MOST_LINES = 24  # of one spectrum; a machine with more has no lines, but noise
 WIDTH = 2  # resolutions from a line's top to its foot, with Hann's window
 BAND = 20  # resolutions whose median tells the level of the spectrum
 
@@ -203,6 +203,7 @@ def strongest_line(
     # Of a sine of height A a taper w passes |A sum(w)/2|^2. Between two bins it sees two thirds of
     # that, and of what errs near the ends, where an axis that turns has most samples, far less.
     share = float(2.0 * powers[0, k] / grid.tapers[0].sum() ** 2 / np.mean(record.values**2))
+    # 0.1: so far below the least that counts, the finer look changes nothing
     if share < 0.1 * least:
         return top, share
     frequency, rest = _less_sine([record], top, grid.step)
@@ -400,6 +401,7 @@ def _medians(rows: Array, width: int) -> Array:
 
 def fast_length(least: int) -> int:
     """The smallest length from ``least`` on whose only prime factors are 2, 3 and 5."""
+    # up to 3^15 and 5^11, each above any length of a log
     odd = (3**a * 5**b for a in range(16) for b in range(12))
     return min(n << (-(-least // n) - 1).bit_length() for n in odd)
 

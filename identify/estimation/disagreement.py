@@ -79,8 +79,8 @@ def disagreeing(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | 
 
     It is looked for with test functions of their length and with longer ones, which are quiet.
     Where the two tell two logs, the one that is sure counts. Where the others do not agree without
-    it, the model is what is wrong, and no log. Of a mechanism, whose joints share their logs, none
-    is told.
+    it, the model is what is wrong, and no log, unless it alone is sure. Of a mechanism, whose
+    joints share their logs, none is told.
     """
     if any(log.motion.bodies is not None for log in logs):
         return None
@@ -146,6 +146,7 @@ def suspect(axis: AxisModel, dataset: Dataset) -> str | None:
 
 def _longer(logs: Sequence[PreparedLog]) -> list[PreparedLog]:
     """The logs by test functions of a usual length, where theirs is clearly shorter."""
+    # 1.5 times: a length that is hardly another tells nothing else
     if not logs or 1.5 * logs[0].test_function.length > LOOK:
         return []
     return [log.at_length(LOOK) for log in logs]
@@ -155,9 +156,10 @@ def _at_one_length(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement
     where = Scaling.of(axis, logs).where
     rows = _rows(axis, logs, where)
     worst = _worst(rows, axis, where)
-    if worst is None or _worst([r for r in rows if r.log.motion.name != worst.log], axis, where):
+    if worst is None:
         return None
-    return worst
+    beside = _worst([r for r in rows if r.log.motion.name != worst.log], axis, where)
+    return worst if beside is None or (worst.is_sure and not beside.is_sure) else None
 
 
 def _worst(
@@ -282,6 +284,7 @@ def _among(at: int, others: Sequence[_Rows], theirs: Sequence[Array]) -> tuple[f
         *(_gains(r, left) for r, left in zip(others, theirs, strict=True)), strict=True
     )
     gain, size = np.stack(gains)[:, at], np.stack(sizes)[:, at]
+    # 1e-300: of no logs that tell the column, no division by zero
     whole = max(float(size.sum()), 1e-300)
     mean = float(np.sum(size * gain)) / whole
     freedom = (len(others) - 1) / len(others)
@@ -325,6 +328,7 @@ def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     cell, most = 0.5, 1 << 15  # of the RMS of each coordinate; cells on either side of its zero
     states = np.concatenate([own.states, *(r.states for r in others)])
     places = np.clip(np.floor(states / cell), -most, most - 1).astype(np.int64) + most
+    # 16 bits for each of the four coordinates
     cells = np.bitwise_or.reduce(places << np.array([0, 16, 32, 48]), axis=1)
     return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
@@ -362,6 +366,7 @@ def _span(time: Array, left: Array) -> tuple[float, float] | None:
     """From when to when (s) most of the squared error is, where that is a part of the time."""
     most, short = 0.8, 0.5  # of the squared error, and of the time
     power = np.cumsum(left**2) / np.sum(left**2)
+    # 1e-9: the last sum is one but for rounding
     ends = np.searchsorted(power, np.minimum(power - left**2 / np.sum(left**2) + most, 1.0 - 1e-9))
     spans = time[np.minimum(ends, len(time) - 1)] - time
     spans = np.where(power - left**2 / np.sum(left**2) + most <= 1.0, spans, np.inf)

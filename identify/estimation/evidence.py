@@ -189,6 +189,8 @@ def students_t(chance: float, freedom: int) -> float:
     as a fit to run.
     """
     z = NormalDist().inv_cdf(1.0 - chance)
+    # coefficients of the expansion in 1/freedom
     first, second = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
+    # the next of them
     third = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
     return z + first / freedom + second / freedom**2 + third / freedom**3

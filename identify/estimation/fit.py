@@ -27,7 +27,7 @@ from twin.model.parameters import ParameterReference, read
 from twin.signals import Array
 from twin.threads import trim_beside
 
-MOST_EVALUATIONS = 40
+MOST_EVALUATIONS = 40  # of the residual; most fits end within ten
 LINES = 6  # of a spectrum that are looked at, the surest first
 
 

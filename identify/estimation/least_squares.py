@@ -50,7 +50,7 @@ def minimise(
     the residual at the start is not finite, the start is returned as not converged. jacobian: may
     overwrite what it gave before; nobody else does.
     """
-    first_damping = 1e-2
+    first_damping = 1e-2  # of the curvature: a first step that is nearly the undamped one
     low, high = bounds
     x = np.clip(start, low, high)
     force = residual(x)
@@ -80,6 +80,7 @@ def minimise(
                 del columns  # not to be held beside the new ones
                 columns, exact = jacobian(moved), True
             x, force, cost = moved, trial, trial_cost
+            # a tenth, and ten times where a step failed: D. W. Marquardt's own factors, 1963
             damping = max(0.1 * damping, 1.0 / most_damping) if good else damping
         elif not exact:
             del columns

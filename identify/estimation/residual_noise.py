@@ -164,6 +164,7 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     trim_memory()  # matrices of all logs follow
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
+    # 24/n is the variance of the kurtosis of n normal samples
     least = gaussian - SURE * np.sqrt(24.0 / effective_samples(rest.force))
     if kurtosis < least or rest.is_predictable() or rest.has_line() or _hidden(fit, logs):
         return False

@@ -245,10 +245,13 @@ class _Problem:
                 change = self.rows(moved) - base
                 size = rms(change) / wanted
                 if not np.isfinite(size):
+                    # 0.1: back towards where the motion stays finite
                     self.steps[i] *= 0.1
+                # within a factor ten of what is wanted, differences are true enough
                 elif size == 0.0 or 0.1 < size < 10.0:
                     break
                 else:
+                    # a thousandfold at once at most, as no motion is linear so far
                     self.steps[i] /= min(max(size, 1e-3), 1e3)
             out[:, i] = np.nan_to_num(change / step)
         return out

@@ -32,6 +32,7 @@ def spatial_periods(
         return ()
     thin = slice(None, None, -(-len(force) // 4000))  # that the first look takes
     peaks = _peaks(position[thin], force[thin], weight[thin], columns[thin], span)
+    # 0.25 cycles a sample: half of what the samples can tell where they are even
     highest = 0.25 * len(position) / span
     found = find_lines(
         [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
@@ -78,6 +79,7 @@ def _gains(waves: NDArray[np.complex128], left: Array, basis: Array) -> Array:
     )
     s, t = sine.T @ left, cosine.T @ left
     free = a * b - c**2
+    # 1e-9, below which sine and cosine are one column there
     sure = free > 1e-9 * a * b
     gain = np.where(sure, b * s**2 + a * t**2 - 2.0 * c * s * t, 0.0) / np.where(sure, free, 1.0)
     return np.asarray(gain)

@@ -135,6 +135,7 @@ class _Room:
     def general(self) -> Iterator[Experiment]:
         """Motion of all axes."""
         yield Tracking(self.duration)
+        # s: hardly a rest, and one in which a bristle creeps
         for dwell in (0.1, 1.0):
             yield Moves(max(int(self.duration / dwell), 2), dwell=dwell, duration=self.duration)
 
@@ -145,6 +146,7 @@ class _Room:
     def passes(self, span: float, speed: float) -> Passes:
         """As many passes as fit in the time, at the speed or as fast as the span allows."""
         speed = neat(min(speed, self.limit.fastest_plateau(span)))
+        # 0.1 s, that a pass dwells at its end
         once = span / speed + self.limit.ramp_time(speed) + 0.1
         repeats = min(max(int(self.duration / once / 2), 1), MOST_REPEATS)
         return Passes(self.axis, span, speed, repeats=repeats)
@@ -153,14 +155,17 @@ class _Room:
         """Passes over the whole travel, the other axis at rest and moving; and a velocity map."""
         span = self.span()
         slow, fast = 2.0 * span / self.duration, self.limit.fastest_plateau(span)
+        # 1.1 of the slowest that still passes twice in the time
         for speed in (1.1 * slow, (slow * fast) ** 0.5, fast):
             passes = self.passes(span, speed)
             yield passes
             if self.other:
                 yield replace(passes, other=self.other)
+        # 0.3 of the travel, so that ten speeds fit in the time
         map_span = neat(0.3 * span)
         fastest = self.limit.fastest_plateau(map_span)
         speeds = np.geomspace(min(SLOWEST * self.scale, SLOW * fastest), fastest, 10)
+        # a fortieth of the time: ten speeds, both ways, as long again between them
         yield Staircase(self.axis, tuple(map(neat, speeds)), map_span, neat(self.duration / 40.0))
 
     def reversing(self) -> Iterator[Experiment]:
@@ -172,12 +177,15 @@ class _Room:
         yield from short
         if self.other:
             yield replace(still, other=self.other)
+        # s: from hardly a rest to a third of the time
         rests = np.geomspace(0.1, self.duration / 3.0, 5)
+        # 0.55 of the time; moves take the rest
         rests *= 0.55 * self.duration / rests.sum()
         yield Rests(self.axis, move.span, move.speed, tuple(map(neat, rests)))
 
     def accelerating(self) -> Iterator[Experiment]:
         """Steps through the travel at high and low acceleration: many forces at each place."""
+        # all of the travel and a third of it, in short steps and in long ones
         for part, count in itertools.product((1.0, 0.3), (60, 15, 3)):
             span, left, efforts = self.span(part), self.duration, []
             for effort in itertools.cycle(EFFORTS):
@@ -191,13 +199,17 @@ class _Room:
 
     def swept(self) -> Iterator[Experiment]:
         """A force sweep on slow passes, over the whole travel and at one place; many sines."""
+        # all of the travel, and a tenth: one place
         for part, highest in itertools.product((1.0, 0.1), SWEPT):
             span = self.span(part)
+            # 2.4 spans in the time: there and back, and the ramps
             speed = neat(min(2.4 * span / self.duration, self.limit.fastest_plateau(span)))
             weak = Sweep(self.axis, span, speed, 1, 1.0, LOWEST, highest, effort=GENTLE)
             yield replace(weak, amplitude=neat(MARGIN * weak.most_force(self.model)))
+        # 0.4 of the rate: what is above, the log does not tell
         period, highest = neat(self.duration / PERIODS), min(SWEPT[-1], 0.4 * self.rate)
         if highest > LOWEST:
+            # a tenth of the travel: one place
             yield Multisine(self.axis, period, 1, self.span(0.1), LOWEST, highest, phases=1)
 
 

@@ -77,6 +77,7 @@ def _drawn_shape(
 
 
 def _drawn_direction(p: Parameter, rng: np.random.Generator) -> float:
+    # about the size of the start value, whose strength is set later
     size = float(rng.uniform(0.5, 1.5))
     return size if p.lower >= 0 else float(size * rng.choice((-1.0, 1.0)))
 
@@ -119,6 +120,7 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
         tiny = 1e-300  # no logarithm of nothing
         return float(np.log(max(size(float(np.exp(log_scale))), tiny) / max(wanted, tiny)))
 
+    # a factor of 1e9 either way: from nothing to what no machine bears
     low, high, risen = float(np.log(1e-9)), float(np.log(1e9)), False
     for _ in range(12):  # to within a hundredth
         middle = 0.5 * (low + high)
@@ -130,6 +132,7 @@ def _scale(size: Callable[[float], float], wanted: float) -> float:
         return float(np.exp(low))
     from scipy.optimize import brentq  # a fit and most diagnoses plant nothing
 
+    # 1e-12 of the size, so that one seed plants one size on every machine
     return float(np.exp(brentq(error, low, high, xtol=1e-12)))
 
 
@@ -175,6 +178,7 @@ def exemplary_motion() -> Motion:
         parts.append(-0.15 * np.cos(np.pi * t / half))  # m
     position = np.concatenate(parts)
     velocity = rate(position, period)
+    # 0.3 N of friction, as of the stage's guide
     command = MASS * rate(velocity, period) + 0.3 * np.sign(velocity)
     other = 0.5 * np.roll(position, len(position) // 7)
     speed = rate(other, period)

@@ -98,6 +98,7 @@ def _is_seen(mode: Mode, told: Response) -> bool:
     """
     low, high = (1.0 + sign * mode.damping.value for sign in (-1.0, 1.0))
     first, last = told.frequency[[0, -1]] / mode.frequency.value
+    # 0.99: at the bound but for what the search leaves
     peaks = mode.damping.value + mode.damping.band < 0.99 * DAMPING[-1]
     evidence = (SURE * mode.gain.value / mode.gain.band) ** 2
     sure = evidence > 3.0 * np.log(2.0 * len(told.frequency)) + RULE.least_bic
@@ -120,6 +121,7 @@ class _Solved:
     def banded(self, i: int, times: float = 1.0) -> Banded:
         """What the value at i is the logarithm of, times a number."""
         value, band = times * float(np.exp(self.values[i])), self.bands[i]
+        # 50, a factor e^50: nothing is told, and exp stays finite
         return Banded(value, value * float(np.expm1(band)) if band < 50.0 else np.inf)
 
     @property
@@ -146,6 +148,7 @@ def _covariance(jac: Array, error: Array) -> Array:
     from scipy.linalg import toeplitz
 
     weight = 1.0 + (error / LOUD) ** 2
+    # SciPy divides the Jacobian by weight^0.75, the curvature of this loss
     plain = (jac.T * weight**0.75).reshape(len(jac.T), 2, -1)
     left = (error / np.sqrt(weight)).reshape(2, -1)
     k = left.shape[1]
@@ -162,6 +165,7 @@ def _covariance(jac: Array, error: Array) -> Array:
 
 def _roughly(told: Response) -> Response:
     """The same, known to a tenth: what it is like as a whole is found first."""
+    # 0.1, as it says
     return replace(told, spread=np.hypot(told.spread, 0.1 * np.abs(told.plant)))
 
 
@@ -176,7 +180,9 @@ def _solved(told: Response, start: Array) -> _Solved:
     modes = (len(start) - 4) // 3
 
     omega = np.log(2.0 * np.pi * told.frequency[[0, -1]])
+    # a factor e^7 of the mass begun with; of the others what no machine is beyond
     low = [start[0] - 7.0, -20.0, -20.0, -100.0] + [omega[0], np.log(DAMPING[0]), -np.inf] * modes
+    # as below
     high = [start[0] + 7.0, 20.0, 40.0, 100.0] + [omega[1], np.log(DAMPING[-1]), np.inf] * modes
     done = least_squares(
         lambda v: _left(v, told), np.clip(start, low, high),
@@ -200,6 +206,7 @@ def _without_modes(told: Response) -> tuple[Array, Array]:
     free, sprung = (float(np.median(m)) for m in (masses, masses[-len(masses) // 3 :]))
     stiffness = 1.0 / float(np.median(np.abs(told.plant[: len(masses) // 6])))
     return (
+        # 0.1: damping and stiffness that hardly act in the band, a tenth of a sample late
         np.array([np.log(free), np.log(0.1 * omega[0]), np.log(0.1 * omega[0] ** 2), 0.1]),
         np.array([np.log(sprung), np.log(omega[0]), np.log(stiffness / sprung), 0.1]),
     )
@@ -269,6 +276,7 @@ def _sampled(values: Array, told: Response) -> Complex:
 
 def _roots(linear: Array, constant: Array) -> tuple[Complex, Complex]:
     """The roots (m, ...) of s^2 + linear s + constant, never the same: each has its own state."""
+    # 1e-6 of the pole: apart, and no peak is moved
     half, least = 0.5 * linear, 1e-6 * (0.5 * linear + 1e-9)
     apart = np.sqrt(np.asarray(half**2 - constant, dtype=complex))
     apart = np.where(np.abs(apart) > least, apart, least)
@@ -297,6 +305,7 @@ def _held(roots: tuple[Complex, Complex], late: Array, told: Response) -> Comple
 def _grown(pole: Complex, time: Array) -> Complex:
     """(exp(p t) - 1)/p, s."""
     x = pole * time
+    # 1e-5: the next term of the series is below rounding
     small = np.abs(x) < 1e-5
     series = time * (1.0 + 0.5 * x + x * x / 6.0)
     return np.where(small, series, np.expm1(x) / np.where(small, 1.0, pole))

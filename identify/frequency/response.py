@@ -104,11 +104,13 @@ def response(records: Sequence[Record], count: int = 200, width: float = 0.03) -
     spectra = [_Spectra.of(record) for record in records]
     longest = max(s.cells for s in spectra) * period
     lowest = (UNKNOWNS + 2) / min(s.cells * period for s in spectra)
+    # 0.45 of the rate: nearer to half of it a polynomial has no room on one side
     if not lowest < 0.45 / period:
         raise InputError(
             f"the shortest log holds {min(s.cells for s in spectra)} samples of one period of its "
             "setpoint; give longer ones"
         )
+    # the same highest frequency
     grid = np.geomspace(lowest, 0.45 / period, count)
     grid = np.unique(np.rint(grid * longest)) / longest
     found = _together(grid, [[s.about(f, width) for f in grid] for s in spectra], period)
@@ -179,6 +181,7 @@ class _Spectra:
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
         unit = (columns / size).conj().T
+        # 1e-12, below which a combination of columns is rounding
         inverse = np.linalg.pinv(unit @ unit.conj().T, rcond=1e-12, hermitian=True) @ unit
         inverse /= size[:, None]
         rows = self.signals[at]
@@ -204,9 +207,11 @@ def _repeats_after(signal: Array) -> int:
     n = len(signal)
     alike = np.fft.irfft(np.abs(np.fft.rfft(signal, fast_length(2 * n))) ** 2)[: n // 3]
     inner = alike[1:-1]
+    # 0.3 of the whole: of three periods a repeat overlaps by two thirds, less its ends
     tops = np.flatnonzero((inner >= alike[:-2]) & (inner >= alike[2:]) & (inner > 0.3 * alike[0]))
     for cells in tops + 1:
         middle = signal[cells:-cells]
+        # 1e-3 of the setpoint, by which a text of a few digits rounds it
         if np.abs(middle[cells:] - middle[:-cells]).max() < 1e-3 * np.ptp(middle):
             return int(cells)
     return n

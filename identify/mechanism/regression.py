@@ -193,6 +193,7 @@ class Regression:
         others = np.setdiff1d(np.concatenate(free), where).astype(int)
         full = self.training.gram[1:, 1:] + np.diag(self._penalty)
         cross = full[np.ix_(others, where)]
+        # 1e-13, below which a combination of columns is rounding
         inner = np.linalg.pinv(full[np.ix_(others, others)], rcond=1e-13, hermitian=True)
         return np.asarray(full[np.ix_(where, where)] - cross.T @ inner @ cross)
 

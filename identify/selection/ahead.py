@@ -28,6 +28,7 @@ class Ahead:
         with self._lock:
             self._shares[change.name] = share
             first = sorted(self._shares.items(), key=lambda pair: -pair[1])[:SHOWN]
+            # 0.01: less is printed as 0 %
             shown = [f"{name} {100.0 * part:.0f} %" for name, part in first if part >= 0.01]
             told = ", ".join(shown)
             if told != self._told:

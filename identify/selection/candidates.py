@@ -227,6 +227,7 @@ def _is_between_knots(law: Fitted, axis: AxisModel, dataset: Dataset) -> bool:
     over = {curve.over for curve in law.effect.curves}
     size = rms(averaged_force(replace(axis, effects=(law,)), dataset.training))
     return any(
+        # an eighth, as above
         size < 0.125 * float(np.abs(np.diff(strengths, 2)).max(initial=0.0))
         for f in axis.effects
         if f.effect.free_shape

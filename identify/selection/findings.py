@@ -58,7 +58,7 @@ BY_PART = (
     ConfidenceBin(0.51, 0.91),
     ConfidenceBin(0.0, 0.82),
 )
-BY_T = (
+BY_T = (  # as above
     ConfidenceBin(6.9, 0.99),
     ConfidenceBin(5.4, 0.98),
     ConfidenceBin(4.6, 0.96),

@@ -200,6 +200,7 @@ def _fit_of(judged: Judged, screening: Screening) -> Fit:
 
 def _roughly(judged: Judged, fit: Fit) -> float:
     """Part of the error above the floor that a fit takes of the training logs."""
+    # 1e-300: of an error at its floor, no division by zero
     above = max(judged.fit.error**2 - judged.fit.floor**2, 1e-300)
     return (judged.fit.error**2 - fit.error**2) / above
 

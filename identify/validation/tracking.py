@@ -145,6 +145,7 @@ def _motion(model: MachineModel, log: Log) -> Setpoint:
     width = 2 * round(0.5 * smoothed * log.sample_rate) + 1
     # s, within which a motion that the log begins amidst is begun from rest
     columns, done = [], np.clip(np.arange(len(log)) * log.period / 0.2, 0.0, 1.0)
+    # the polynomial of fifth degree from rest to rest
     begun = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
     for name in model.axes:
         own = log.axes[name].columns if name in log.axes else {"position": np.zeros(len(log))}
