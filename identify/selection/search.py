@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.alignment import begun_at, realigned, synchronised, time_origins
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
@@ -48,7 +49,7 @@ from identify.selection.trying import (
     tried_beside,
     tried_exchanged,
 )
-from twin.effect import Kind
+from twin.effect import Effect, Kind
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel
 from twin.parallel import Progress, silent, within
@@ -160,15 +161,18 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
     dataset = begun_at(dataset, time_origins(part))
-    same = all(a is b for a, b in zip(given, dataset.training, strict=True))
     first = base
-    if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
+    if not _are_same(given, dataset.training) or rms(error_on(found.base.fit.axis, given)) < base.error:
         first = replace(fit_axis(found.base.fit.axis, dataset.training), begun=base.begun)
     judged = final = Judged(first, dataset)
     if found.steps:
         fit = fit_axis(found.final.fit.axis, dataset.training)
         final = Judged(replace(fit, begun=base.begun), dataset)
     return replace(found, dataset=dataset, base=judged, final=final)
+
+
+def _are_same(some: Sequence[PreparedLog], others: Sequence[PreparedLog]) -> bool:
+    return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))
 
 
 def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
@@ -268,23 +272,20 @@ def _with_free_exponents(
 def on_final_dataset(final: Judged, found: Found) -> Found:
     """What was found, on the dataset of the final fit, whose channel delay is another.
 
-    So that the error without anything is one number, beside every candidate and in the answer. What
-    was decided, and by which score, stays; so does the part that those leave which were not taken.
+    So that the error without anything is one number, beside every candidate and in the answer, and
+    so is that with the law that alone was found. What was decided, and by which score, stays; so
+    does the part that all others leave.
     """
-    dataset = final.dataset
-
-    def there(fit: Fit) -> Judged:
-        one = Judged(fit, dataset)
-        return one if fit.logs is dataset.training else refitted_on(fit.axis, one)
-
-    first = there(found.base.fit)
-    taken = {id(s.tried.candidate) for s in (*found.steps, *found.passed)}
+    dataset, first = final.dataset, found.base
+    if not _are_same(first.fit.logs, dataset.training):
+        first = refitted_on(first.fit.axis, Judged(first.fit, dataset))
+    first = Judged(first.fit, dataset)
 
     def candidate(one: Candidate) -> Candidate:
-        if one.is_noise or id(one) not in taken:
+        if one.is_noise or _laws(one.fit) != _laws(final.fit):
             left, error = np.sqrt(one.gain.left), first.other_error
             return replace(one, gain=replace(one.gain, before=error, after=left * error))
-        by = candidate_of(first, there(one.fit), one.effect, ())
+        by = candidate_of(first, final, one.effect, ())
         return replace(one, fit=by.fit, evidence=by.evidence, gain=by.gain)
 
     ranking = {id(one): candidate(one) for one in found.ranking}
@@ -295,6 +296,11 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
 
     steps, passed = (tuple(map(same, each)) for each in (found.steps, found.passed))
     return replace(found, base=first, ranking=tuple(ranking.values()), steps=steps, passed=passed)
+
+
+def _laws(fit: Fit) -> list[tuple[Effect, frozenset[str]]]:
+    """The effects of a fit, with what each holds."""
+    return [(f.effect, f.fixed) for f in fit.axis.effects]
 
 
 def is_tied(one: Tried, best: Tried) -> bool:
