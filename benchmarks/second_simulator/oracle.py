@@ -2,7 +2,8 @@
 
 The force of what is hidden, as its true law makes it along the measured path, is one column beside
 acceleration, friction, direction, speed and 1. Fitted to some logs and judged on others at several
-lengths of the test functions, it is provable where at one of them it is.
+lengths of the test functions, it is provable where at one of them it is. So is a log otherwise than
+the same log that nothing spoils, where what the true laws leave of it is surely more.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from twin.signals import Array, local_parabola
 LENGTHS = (0.02, 0.05, 0.1, 0.2)  # s
 BLOCKS = 24
 SURE, MATTERS = 5.0, 0.1  # t over blocks, and part of the squared error, of what is provable
+TINY = 1e-300  # of nothing, no division by zero
+MOMENT = 3.0  # times the largest error of a sound log, from which a moment is otherwise
 
 
 def is_provable(plant: Plant, plain: Plant, fit: Sequence[Log], held: Sequence[Log]) -> bool:
@@ -28,21 +31,56 @@ def is_provable(plant: Plant, plain: Plant, fit: Sequence[Log], held: Sequence[L
     return any(_proved(plant, plain, fit, held, length) for length in LENGTHS)
 
 
+def is_otherwise(plant: Plant, plain: Plant, fit: Sequence[Log], spoiled: Log, sound: Log) -> bool:
+    """Whether a spoiled log shows what spoils it beside the same log without: by all sound ones."""
+    return any(_differs(plant, plain, fit, spoiled, sound, length) for length in LENGTHS)
+
+
 def _proved(
     plant: Plant, plain: Plant, fit: Sequence[Log], held: Sequence[Log], length: float
 ) -> bool:
     own, others = ([_columns(plant, plain, g, length) for g in logs] for logs in (fit, held))
-    left = []
-    for count in (-1, None):  # without what is hidden, which is the last column, and with it
-        rows = np.concatenate([c[:, 1:count] for c in own])
-        size = np.linalg.norm(rows, axis=0) + 1e-300
-        gains = np.linalg.lstsq(rows / size, np.concatenate([c[:, 0] for c in own]), rcond=1e-9)[0]
-        left.append(np.concatenate([c[:, 0] - c[:, 1:count] @ (gains / size) for c in others]))
-    squares = np.array([[np.mean(b**2) for b in np.array_split(r, BLOCKS)] for r in left])
-    gain = np.log(squares[0] / squares[1])
-    t = gain.mean() / (gain.std(ddof=1) / np.sqrt(BLOCKS))
-    part = 1.0 - np.mean(left[1] ** 2) / np.mean(left[0] ** 2)
-    return bool(t > SURE and part > MATTERS)
+    without, with_it = (  # what is hidden is the last column
+        np.concatenate(_left(own, others, count)) for count in (-1, None)
+    )
+    return _is_larger(without, with_it)
+
+
+def _differs(
+    plant: Plant, plain: Plant, fit: Sequence[Log], spoiled: Log, sound: Log, length: float
+) -> bool:
+    every = [_columns(plant, plain, g, length) for g in (spoiled, sound, *fit)]
+    there, usual, *others = _left(every[2:], every, None)
+    if np.abs(there).max() > MOMENT * np.abs(usual).max() or _is_larger(there, usual):
+        return True
+    # One strength that this log alone asks for, beside what all sound ones do.
+    gains = np.array(
+        [left @ c[:, 1:] / np.sum(c[:, 1:] ** 2 + TINY, axis=0)
+         for c, left in zip(every, (there, usual, *others), strict=True)]
+    )  # fmt: skip
+    away = np.abs(gains[0] - gains[1:].mean(axis=0)) > SURE * gains[1:].std(axis=0, ddof=1)
+    return bool(away.any()) and _part(there, usual) > MATTERS
+
+
+def _left(own: Sequence[Array], others: Sequence[Array], count: int | None) -> list[Array]:
+    """What least squares by some logs leave of others, N by test functions."""
+    rows = np.concatenate([c[:, 1:count] for c in own])
+    size = np.linalg.norm(rows, axis=0) + TINY
+    gains = np.linalg.lstsq(rows / size, np.concatenate([c[:, 0] for c in own]), rcond=1e-9)[0]
+    return [c[:, 0] - c[:, 1:count] @ (gains / size) for c in others]
+
+
+def _is_larger(one: Array, other: Array) -> bool:
+    """Whether one residual (n,) N is surely larger than another, by blocks."""
+    squares = np.array([[np.mean(b**2) for b in np.array_split(r, BLOCKS)] for r in (one, other)])
+    gain = np.log((squares[0] + TINY) / (squares[1] + TINY))
+    scatter = gain.std(ddof=1) / np.sqrt(BLOCKS)
+    return bool(gain.mean() > SURE * scatter) and _part(one, other) > MATTERS
+
+
+def _part(one: Array, other: Array) -> float:
+    """Part of the squared residual that another one is less."""
+    return 1.0 - float(np.mean(other**2) / np.mean(one**2))
 
 
 def _columns(plant: Plant, plain: Plant, log: Log, length: float) -> Array:

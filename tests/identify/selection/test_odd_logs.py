@@ -95,6 +95,29 @@ def test_a_delay_of_some_samples_is_told_beside_what_the_others_prove(late: int)
         assert odd.otherwise.there == pytest.approx(late / RATE, rel=0.2)
 
 
+@pytest.mark.parametrize(("constant", "odd"), [(4.0, "run1"), (0.0, "run2")])
+def test_a_log_that_is_surely_otherwise_is_not_excused_by_one_that_may_be(constant, odd) -> None:
+    """A tilt of many times the others' error, beside a force that is late in another log."""
+    logs = {name: logged(SLIDE, ride, noise=0.5) for name, ride in RIDES.items()}
+    other = {
+        "run1": with_force(logs["run1"], lambda force: force + constant),
+        "run2": with_force(logs["run2"], lambda force: np.roll(force, 4)),
+    }
+    found = identify.fit(MODEL, {**logs, **other})
+    told = odd_in(found.fits["x"].axis, found.datasets["x"])
+    assert told is not None
+    assert told.log == odd
+
+
+def test_two_logs_that_are_surely_otherwise_tell_of_the_model() -> None:
+    logs = runs()
+    other = {
+        name: with_force(logs[name], lambda force: 0.6 * force + 2.0) for name in ("run1", "run2")
+    }
+    found = identify.fit(MODEL, {**logs, **other})
+    assert odd_in(found.fits["x"].axis, found.datasets["x"]) is None
+
+
 def test_a_push_is_told_with_its_time() -> None:
     def pushed(force: np.ndarray) -> np.ndarray:
         force[2000:2200] += 3.0
