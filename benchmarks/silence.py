@@ -33,7 +33,10 @@ TITLE = "What the logs prove, with one of five spoiled"
 SEED, MACHINES = 83, 60
 EFFECTS = tuple(name for name in HIDDEN if name != "nothing")
 # Of which a check tells what is wrong with a log, and not how little a sound one tells.
-SPOILT = {Fault.ALIASED, Fault.OUTLIERS, Fault.STEP, Fault.SATURATION, Fault.LAG}
+# A jump ahead may be lost counts, or samples that are missing: both tell where it is wrong.
+SPOILT = {
+    Fault.ALIASED, Fault.OUTLIERS, Fault.STEP, Fault.MISSING, Fault.SATURATION, Fault.LAG,
+}  # fmt: skip
 SOUND = 0.3  # of the machines, whose logs are all sound
 
 
