@@ -95,14 +95,6 @@ def _values(
     )
 
 
-def friction_left(motions: Sequence[Motion], length: float) -> float:
-    """N RMS that mass, friction, a constant and the place leave by test functions of that length.
-
-    length: s.
-    """
-    return _with_friction(*_rows(motions, length, _place(motions))).left
-
-
 def _place(motions: Sequence[Motion]) -> tuple[float, bool]:
     """The middle of the positions, m, and whether the axis turns."""
     position = np.concatenate([m.position for m in motions])

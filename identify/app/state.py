@@ -7,7 +7,6 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import tomlkit
@@ -162,8 +161,3 @@ def answer_of(folder: Folder, name: str) -> dict[str, Any]:
     found.pop("axes", None) if "ranking" in found and len(found.get("axes", {})) < 2 else None
     cleaned: dict[str, Any] = plain(found)
     return cleaned
-
-
-def size_of(path: Path) -> int:
-    """Bytes of a file, 0 where there is none."""
-    return path.stat().st_size if path.is_file() else 0

@@ -191,7 +191,8 @@ def _waves(readings: Array, period: float) -> Array:
 def _gains(columns: Array, wanted: Array) -> Array:
     return np.asarray(
         # 1e-9, below which a column is a combination of others
-        np.linalg.lstsq(columns.T @ columns, columns.T @ wanted, rcond=1e-9)[0], float
+        np.linalg.lstsq(columns.T @ columns, columns.T @ wanted, rcond=1e-9)[0],
+        float,
     )
 
 

@@ -161,8 +161,8 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
     dataset = begun_at(dataset, time_origins(part))
-    first = base
-    if not _are_same(given, dataset.training) or rms(error_on(found.base.fit.axis, given)) < base.error:
+    first, same = base, _are_same(given, dataset.training)
+    if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
         first = replace(fit_axis(found.base.fit.axis, dataset.training), begun=base.begun)
     judged = final = Judged(first, dataset)
     if found.steps:

@@ -21,7 +21,7 @@ from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
 from twin.importers.proposal.forces import exchanged, with_force
-from twin.importers.proposal.names import names_of, unit_of, units_of
+from twin.importers.proposal.names import names_of, unit_of
 from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
 from twin.importers.proposal.signals import Axis, File
 from twin.importers.proposal.text import (
@@ -174,15 +174,6 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
 
 
 _NO_MOTION = "without a position no column is known to be the force that moves it"
-
-
-def unit_in(name: str, *kinds: str) -> str | None:
-    """The unit that a name states, of the quantities with these SI units; of all if none."""
-    written = unit_of(name)
-    for _, unit in units_of(written) if written else ():
-        if is_unit(unit, *(kinds or _KINDS)):
-            return unit
-    return None
 
 
 def _about(name: str, raw: np.ndarray) -> str:
