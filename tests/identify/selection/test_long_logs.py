@@ -30,6 +30,11 @@ def test_what_the_beginnings_show_is_fitted_to_the_whole_of_long_logs() -> None:
     assert found.final.ratio < 1.4
     assert found.base.error > 3.0 * found.final.error
     assert found.tested.before == pytest.approx(found.base.error, rel=0.1)
+    (row,) = (c for c in found.ranking if c.effect.name == "cogging")
+    assert row.fit is found.final
+    assert row.gain.after == pytest.approx(found.tested.after, rel=1e-6)
+    others = [c.gain.before for c in found.ranking]
+    assert others == pytest.approx([row.gain.before] * len(others))
 
 
 def test_what_begins_behind_the_beginnings_is_told_of_the_whole_of_long_logs() -> None:
