@@ -18,13 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identify.dataset.dataset import Dataset
+from identify.dataset.drive import parts_of
 from identify.dataset.odd_log import FEWEST, Disagreement, Otherwise, Recorded
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log
 from identify.dataset.test_function import LOOK
 from identify.estimation.evidence import rms
-from identify.estimation.force_balance import jacobian, residual
+from identify.estimation.force_balance import averaged_force, jacobian, residual
 from identify.estimation.least_squares import RIDGE
 from identify.estimation.scaling import Scaling
+from twin.effect import RUBBING
 from twin.model.machine import AxisModel
 from twin.model.parameters import ParameterReference, read
 from twin.signals import Array, rate
@@ -110,18 +112,24 @@ def _at_rest(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | Non
     """The log with one moment of its rests that stands out against all of all logs, if any.
 
     A force that no motion follows, beyond what friction holds anywhere: a glitch of the recording,
-    a stop, a hand. No fit of an axis that sticks sees it.
+    a stop, a hand. What friction holds at rest, no other log tells.
     """
-    if len(logs) < FEWEST or not sticks(axis) or any(log.motion.bodies is not None for log in logs):
+    if len(logs) < FEWEST or not _rests(axis) or any(log.motion.bodies is not None for log in logs):
         return None
+    held = averaged_force(parts_of(axis, *RUBBING), logs)
     left = [residual(axis, [log]) for log in logs]
     for k, (log, own) in enumerate(zip(logs, left, strict=True)):
         if moving([log], sticks=True)[np.argmax(np.abs(own))]:
             continue
-        others = [*left[:k], *left[k + 1 :]]
+        others = [*left[:k], *left[k + 1 :], held]
         if (moment := _moment(log, log.time, own, others, 1.0)) is not None:
             return replace(moment, at_rest=True)
     return None
+
+
+def _rests(axis: AxisModel) -> bool:
+    """Whether a friction holds it where it does not move."""
+    return axis.friction is not None
 
 
 def suspect(axis: AxisModel, dataset: Dataset) -> str | None:
@@ -174,7 +182,7 @@ def _worst(
 def _rows(
     axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
 ) -> list[_Rows]:
-    kept = split_by_log(moving(logs, sticks(axis)), logs)
+    kept = split_by_log(moving(logs, _rests(axis)), logs)
     left = split_by_log(residual(axis, logs), logs)
     slopes = jacobian(axis, logs, where)
     size = np.linalg.norm(slopes, axis=0)

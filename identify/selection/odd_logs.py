@@ -3,7 +3,8 @@
 One spoiled log raises the floor of all and hides what the others prove. But what a model lacks may
 look like a log that disagrees, until it is found. So a log that stands out goes, the diagnosis is
 made of the others, and the log is asked again beside what was found: only one that still disagrees
-is named, any other comes back.
+is named, any other comes back. One that alone shows what the model lacks seems odd as well: where
+nothing was found without it, all logs are asked together.
 """
 
 from __future__ import annotations
@@ -37,31 +38,26 @@ def without_odd_log(
             break
     else:
         ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
-    if not _is_unexplained(ended):
+    unexplained = _is_unexplained(ended)
+    if odd is None or _spoiling(odd, dataset) is None:
+        if not unexplained:
+            return ended, odd
+        if _may_be_all(odd):
+            return ended, None
+        return _without_suspect(base, dataset, conclude) or (ended, odd)
+    if ended.findings or (odd.is_sure and not unexplained):
         return ended, odd
-    if _spoiling(odd, dataset):
-        return _of_all(conclude(base, dataset), dataset, (ended, odd))
-    if _may_be_all(odd):
-        return ended, None
-    return _without_suspect(base, dataset, conclude) or (ended, odd)
+    # Nothing was found without it: it may be the one that shows what the model lacks.
+    whole = conclude(base, dataset)
+    beside = _odd_beside(whole, dataset)
+    if whole.findings and _spoiling(beside, dataset) is None:
+        return whole, beside
+    return (whole, None) if unexplained and _may_be_all(odd) else (ended, odd)
 
 
 def _may_be_all(odd: Disagreement | None) -> bool:
     """Whether it may be no log's: what all of them lack looks like some delay or gain of one."""
     return odd is not None and odd.is_of_recording and not odd.is_sure
-
-
-def _of_all(
-    whole: Conclusion, dataset: Dataset, without: tuple[Conclusion, Disagreement | None]
-) -> tuple[Conclusion, Disagreement | None]:
-    """What all logs come to, where the others are not explained without an odd one.
-
-    That it is odd stands unless all together prove something, beside which it is not.
-    """
-    beside = _odd_beside(whole, dataset)
-    if whole.findings and _spoiling(beside, dataset) is None:
-        return whole, beside
-    return (whole, None) if _may_be_all(without[1]) else without
 
 
 def _spoiling(odd: Disagreement | None, dataset: Dataset) -> str | None:

@@ -21,6 +21,7 @@ from identify.estimation.disagreement import odd_in
 from identify.output.words.odd import odd_in_words, with_odd
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.checks.report import CheckReport, Fault
+from twin.effects import Catalogue
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -107,6 +108,27 @@ def test_a_log_that_is_surely_otherwise_is_not_excused_by_one_that_may_be(consta
     told = odd_in(found.fits["x"].axis, found.datasets["x"])
     assert told is not None
     assert told.log == odd
+
+
+@pytest.mark.parametrize(("size", "told"), [(0.3, False), (2.0, True)])
+def test_what_a_bristle_may_hold_at_rest_makes_no_log_odd(size: float, told: bool) -> None:
+    """Where others pass it rests for a moment, and bears 0.3 N more: its friction holds 0.31 N."""
+
+    def resting(force: np.ndarray) -> np.ndarray:
+        force[20:90] += size
+        return force
+
+    coulomb = SLIDE["coulomb_viscous"].values
+    bristle = {"Fc": coulomb["Fc"], "Fs": 1.1 * coulomb["Fc"], "sigma2": coulomb["sigma2"]}
+    axis = having(SLIDE, "lugre", sigma0=1e5, sigma1=100.0, **bristle)
+    logs = runs(axis)
+    spoiled = {**logs, "run1": with_force(logs["run1"], resting)}
+    found = identify.fit(replace(MODEL, axes={"x": axis}), spoiled)
+    odd = odd_in(found.fits["x"].axis, found.datasets["x"])
+    assert (odd is not None) == told
+    if odd is not None:
+        assert odd.log == "run1"
+        assert odd.at_rest
 
 
 def test_two_logs_that_are_surely_otherwise_tell_of_the_model() -> None:
@@ -204,7 +226,7 @@ def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
     assert odd.otherwise.what == "coulomb_viscous.Fc"
 
 
-def of_silence(seed: int, number: int) -> tuple[Case, AxisDiagnosis]:
+def of_silence(seed: int, number: int, catalogue: Catalogue = FEW) -> tuple[Case, AxisDiagnosis]:
     """A drive of the second simulator with five logs, and what it is told by few effects."""
     case = list(cases(seed, number + 1))[number]
     plant = case.plants[1]
@@ -212,7 +234,8 @@ def of_silence(seed: int, number: int) -> tuple[Case, AxisDiagnosis]:
     training, held = (
         {name: logs[name] for name in some} for some in (case.order[:3], case.order[3:4])
     )
-    found = identify.diagnose(first_model(training, "m", FEW), training, held, catalogue=FEW)
+    model = first_model(training, "m", catalogue)
+    found = identify.diagnose(model, training, held, catalogue=catalogue)
     return case, found.axes[AXIS]
 
 
@@ -222,6 +245,14 @@ def test_what_all_logs_lack_is_no_delay_of_one() -> None:
     case, told = of_silence(92, 4)
     assert case.spoiled is None
     assert not told.findings
+    assert told.dataset.odd is None
+
+
+@pytest.mark.slow
+def test_a_log_that_alone_shows_what_the_model_lacks_is_not_odd() -> None:
+    """The slow one, of a friction that falls with speed: the others told that nothing is missing."""
+    _, told = of_silence(106, 34, few("coulomb_viscous", "constant_force", "stribeck"))
+    assert told.named == ("stribeck",)
     assert told.dataset.odd is None
 
 
