@@ -250,7 +250,7 @@ def test_what_all_logs_lack_is_no_delay_of_one() -> None:
 
 @pytest.mark.slow
 def test_a_log_that_alone_shows_what_the_model_lacks_is_not_odd() -> None:
-    """The slow one, of a friction that falls with speed: the others told that nothing is missing."""
+    """The slow one, of a friction that falls with speed: the others lacked nothing."""
     _, told = of_silence(106, 34, few("coulomb_viscous", "constant_force", "stribeck"))
     assert told.named == ("stribeck",)
     assert told.dataset.odd is None
