@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from identify.estimation.evidence import rms
+from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import unabsorbed
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
@@ -24,6 +28,16 @@ def is_held(change: Change, last: Change, without: Judged, fit: Judged) -> bool:
         without.fit.kept
     ]
     return bool(np.sum(unabsorbed(own, without.fit.basis) ** 2) < RULE.least_fall * np.sum(own**2))
+
+
+def has_collapsed(change: Change, accepted: Judged, fit: Judged) -> bool:
+    """Whether little is left of a law, of what it had as it was accepted: it stood for others."""
+
+    def size(one: Judged) -> float:
+        laws = tuple(f for f in one.fit.axis.effects if f.effect.name == change.name)
+        return rms(averaged_force(replace(one.fit.axis, effects=laws), fit.fit.logs))
+
+    return size(fit) < RULE.collapse * size(accepted)
 
 
 def _shows(over: Coordinate, law: Effect) -> bool:

@@ -36,7 +36,7 @@ from identify.selection.changes import (
     in_simplest_values,
 )
 from identify.selection.controls import ControlTest
-from identify.selection.held import is_held
+from identify.selection.held import has_collapsed, is_held
 from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.trying import (
     LEADERS,
@@ -363,10 +363,14 @@ def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Trie
     """The laws that take about as much as a free curve, which are preferred to it.
 
     It has shown that something is missing, so none of them has to be the best of many by itself.
+    A further one of a law that the model has takes as much: a few sines imitate any curve.
     """
-    # A curve of ten numbers can imitate any law.
-    least = NEARLY * curve.candidate.part
-    laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least]
+
+    def least(t: Tried) -> float:
+        # A curve of ten numbers can imitate any law.
+        return (1.0 if t.change.effect.number > 1 else NEARLY) * curve.candidate.part
+
+    laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least(t)]
     alone = (
         t if t.candidate.supported else judged_change(judged, t.screening, t.judged.fit)
         for t in laws
@@ -470,13 +474,17 @@ def _needed(
 ) -> tuple[Judged, tuple[Step, ...]]:
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     judged, steps = _less_replaced(judged, steps, first)
-    for step in steps[:-1]:
+    for was in steps[:-1]:
+        fallen = has_collapsed(was.change, was.tried.judged, judged)
+        step = replace(was, held=was.held and not fallen)
+        steps = tuple(step if s is was else s for s in steps)
         if step.held or any(s.change.name == step.change.name for s in steps if s is not step):
             continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = refitted_on(axis, judged)
-            if not step.with_others and is_held(step.change, steps[-1].change, without, judged):
+            may = not (step.with_others or fallen)
+            if may and is_held(step.change, steps[-1].change, without, judged):
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
             needed = _is_needed(step.change, without, judged)

@@ -49,7 +49,6 @@ def recorded(seed: int, force: float = 0.0, growth: float = 0.0, fall: float = 0
     return Log(RATE, {"x": replace(x, columns=columns)})
 
 
-@pytest.mark.short(1)
 @pytest.mark.parametrize(
     ("what", "planted", "effect", "parameter", "value"),
     [
@@ -103,7 +102,6 @@ def test_a_channel_goes_through_import_and_log(tmp_path: Path):
     assert len(x) == 1200
 
 
-@pytest.mark.slow
 def test_what_is_left_may_depend_on_a_channel():
     logs = {str(seed): recorded(seed, force=1.0) for seed in (4, 5, 6)}
     found = identify.diagnose(MODEL, logs, catalogue=few("constant_force"))

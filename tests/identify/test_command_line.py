@@ -187,7 +187,6 @@ def test_help_is_where_it_is_looked_for(tmp_path):
     assert "selftest" not in done.stdout
 
 
-@pytest.mark.slow
 def test_a_truncated_log_is_recovered_diagnosed_and_no_effect_added(folder):
     result = twin("recover", "cut.mcap", "-o", "good.mcap", "--json", folder=folder)
     assert result.returncode == 0, result.stderr
@@ -316,7 +315,6 @@ ARGUMENTS = {
 OUT = {"fit": "f.toml", "add": "n.toml", "plan": "e.toml"}
 
 
-@pytest.mark.short(2)
 @pytest.mark.parametrize("name", ARGUMENTS)
 def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch):
     monkeypatch.setattr("twin.effects.load_catalogue", few)

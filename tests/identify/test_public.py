@@ -47,7 +47,6 @@ def test_a_package_offers_ten_to_forty_names_and_lists_them(package) -> None:
         _ = package.nothing
 
 
-@pytest.mark.slow
 def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, file) -> None:
     assert list(identify.first_model(log).axes) == list(log.axes)
     given = [log, file, str(file), [log], (file,), {"a": log}, {"a": file}]
@@ -215,7 +214,6 @@ def test_every_message_is_what_was_written(tmp_path: Path) -> None:
         write_topics({"/a": {"b": np.array([np.nan])}}, {}, 1.0, tmp_path / "b.mcap")
 
 
-@pytest.mark.slow
 def test_measured_is_model_and_residual_and_the_layout_shows_them(tmp_path: Path) -> None:
     with in_small(duration=2.0):
         cli_runs.twin("simulate", "tracking", "-o", "l.mcap", folder=tmp_path)

@@ -61,7 +61,6 @@ def drifts(model: MachineModel, log: Log, simulator=ReducedSimulator) -> float:
     return rms_error(free_run(model, by_log(seen)["log"], simulator), "x")
 
 
-@pytest.mark.slow
 def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
     early = changed(logged(STAGE, seconds=5.0), force=lambda f: np.roll(f, 1))
     fitted = fit(STAGE, {"log": early})
@@ -117,7 +116,6 @@ def test_a_restart_knows_the_other_axis_acceleration(simulator, name, values):
     assert np.sqrt(np.nanmean(found**2)) < 3.0 * np.sqrt(np.nanmean(bare**2))
 
 
-@pytest.mark.slow
 def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
     lacking = STAGE.with_axis("x", STAGE.axes["x"].without("roller_spikes"))
     for seed in (2, 3):
@@ -242,7 +240,6 @@ def test_logs_too_short_for_a_motion_or_a_test_function_are_told_by_their_length
             datasets(PLAIN, {"a": logged(STAGE, seconds=4.0)}, {}, length)
 
 
-@pytest.mark.slow
 def test_the_beginnings_of_long_logs_are_their_own_beginnings():
     """Also where 30 s are no whole number of samples, and a beginning is a little longer."""
     t = np.arange(27_000) / 610.36

@@ -122,7 +122,6 @@ def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     assert not after.ambiguous_with or truth == SIMPLER
 
 
-@pytest.mark.slow
 def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     case = CASES["delay"]
     machine = case.machine("actuator_delay")
@@ -141,7 +140,6 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     assert any("twin plan" in remark for remark in card.remarks)
 
 
-@pytest.mark.slow
 def test_what_no_motion_tells_apart_is_said():
     # The cable of this stage has a constant force of its own, which takes over the first.
     rivals = [CATALOGUE["constant_force"], CATALOGUE["asymmetric_friction"]]
@@ -150,7 +148,6 @@ def test_what_no_motion_tells_apart_is_said():
     assert "not decided" in plan_text(found)
 
 
-@pytest.mark.slow
 def test_without_rivals_the_experiment_says_most_about_the_model():
     stage = stage_of()
     with pytest.raises(InputError, match="different"):

@@ -55,7 +55,6 @@ def test_a_neat_value_has_three_digits_and_is_no_larger(value):
     assert float(f"{found:.3g}") == neat(found) == found
 
 
-@pytest.mark.slow
 def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
     found, _ = proposals(STAGE, "x", 8.0)
     assert {Tracking, Moves, Passes, Staircase, Steps, Sweep} <= {type(e) for e in found}
@@ -74,7 +73,6 @@ def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
 TURNED = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5)  # rad
 
 
-@pytest.mark.short(1)
 @pytest.mark.parametrize(("noise", "scale"), [(1e-6, 6.8 / 0.34), (1e-4, 50.0 * 1e-4 / 2e-5)])
 def test_angles_are_part_of_the_travel_and_seen_by_the_encoder(noise, scale):
     """The lengths of a linear stage, taken for rad, were lost in the noise of a rotary axis."""
@@ -101,7 +99,6 @@ def test_a_slow_axis_is_mapped_as_fast_as_it_can_and_a_weak_motor_moves_gently()
     assert efforts == {0.2, 0.1}  # a fifth of what the limits allow, and half of it under a sweep
 
 
-@pytest.mark.short(2)
 @pytest.mark.parametrize("name", STAGES)
 def test_every_proposal_stays_within_the_limits_of_the_stage(name):
     stage = STAGES[name]
@@ -130,7 +127,6 @@ def arena_of(stage: MachineModel, **options: float) -> Arena:
     return Arena(stage, "x", (Explanation("as it is", stage.axes["x"]),), **options)
 
 
-@pytest.mark.slow
 def test_what_a_weak_motor_cannot_do_is_not_planned():
     stage = replace(one_axis(WEAK), sample_rate=RATE)
     trials, not_run = contest(arena_of(stage), proposals(stage, "x", 20.0)[0])

@@ -156,7 +156,6 @@ def test_what_hardly_moves_or_is_too_slow_has_no_record():
         arena(FIRST).record(FIRST, resting)
 
 
-@pytest.mark.slow
 def test_trials_come_by_falling_gain_and_a_refit_judges_by_the_truth_told_worst():
     tried, bars = [Tracking(2.0), Tracking(0.4), Tracking(4.0)], []
     every, not_run = contest(arena(FIRST, SECOND), tried, lambda *done: bars.append(done[1:]))
@@ -184,7 +183,6 @@ def test_trials_come_by_falling_gain_and_a_refit_judges_by_the_truth_told_worst(
 LOG = windowed(SHORT)
 
 
-@pytest.mark.slow
 def test_a_plan_leaves_out_logs_that_refute_a_rival():
     """They would decide whatever the experiment is; a refit of the new log takes the mass over."""
     rivals = Explanation("good", PLAIN), Explanation("bad", replace(PLAIN, mass=6.0))

@@ -24,13 +24,11 @@ def nights(seed: int, machines: int = 6, count: int = 90) -> np.ndarray:
     return own * (1.0 + SCATTER * rng.standard_normal((machines, count)))
 
 
-@pytest.mark.slow
 def test_machines_that_are_well_raise_none() -> None:
     for seed in range(3):
         assert alarms_of([panel(nights(seed, count=300))]) == ()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("share", "within"), [(0.1, 5), (0.03, 30)])
 def test_a_change_is_told_within_its_nights_with_date_and_size(share, within) -> None:
     for seed in range(5):

@@ -221,7 +221,6 @@ def log(elastic: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> Path
     return path
 
 
-@pytest.mark.slow
 def test_twin_and_model_show_what_was_planted_in_spite_of_friction(
     elastic: MachineModel, log: Path
 ) -> None:
@@ -236,7 +235,6 @@ def test_twin_and_model_show_what_was_planted_in_spite_of_friction(
         assert shown.plant.delay.value == pytest.approx(1.3e-3, abs=2e-5)
 
 
-@pytest.mark.slow
 def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     table, picture = tmp_path / "r.csv", tmp_path / "bode.png"
     done = twin("frf", log, "-o", table, "--plot", picture, folder=tmp_path)
@@ -259,7 +257,6 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
 
 
-@pytest.mark.slow
 def test_a_page_shows_it_beside_the_model(log: Path, elastic: MachineModel, tmp_path: Path) -> None:
     save_model(elastic, tmp_path / "m.toml")
     done = twin("compare", "m.toml", log, "-o", "page.html", folder=tmp_path)

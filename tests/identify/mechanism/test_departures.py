@@ -73,7 +73,6 @@ def test_what_is_changed_must_move_and_nothing_else(changed, right):
         assert 0.2 / 250 < found.datasets["joint1"].channel_delay < 0.6 / 250
 
 
-@pytest.mark.slow
 def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_value():
     changed = Changed(rotor={1: 0.4 * OWN[1]})
     logs = [{f"{i}": log_of(ARM, changed, 30 + i, 8.0)} for i in range(2)]
@@ -89,7 +88,6 @@ def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_val
     assert given == pytest.approx(ARM.armature[1] + 0.4 * OWN[1], rel=0.02)
 
 
-@pytest.mark.slow
 def test_logs_of_a_load_that_is_held_another_way_disagree():
     ways = [Changed(payload=0.8, held=(0.25, 0.0, z)) for z in (0.1, -0.1)]
     logs = [{f"{i}": log_of(ARM, way, 50 + i, 8.0)} for i, way in enumerate(ways)]

@@ -11,7 +11,7 @@ import pytest
 import identify
 from benchmarks import silence
 from benchmarks.drives import row
-from benchmarks.foreign import CATALOGUE, STAGE, diagnosed, model_for
+from benchmarks.foreign import CATALOGUE, FORMS, STAGE, diagnosed, model_for, planted_row
 from benchmarks.second_simulator.drives import Recorder
 from benchmarks.second_simulator.effects import INSIDE
 from benchmarks.second_simulator.machine import drawn
@@ -51,6 +51,14 @@ def test_what_something_foretells_is_no_alias_of_the_command() -> None:
     """A servo of 4 kHz logged at 2 kHz, within 1.2 floors: its spring was told as noise."""
     found = silence.row(silence.cases(91, 9)[8])
     assert found["mark"] in {"right", "equivalent"}
+
+
+@pytest.mark.slow  # 40 s
+def test_sines_that_stand_for_the_shape_of_a_cable_are_not_told() -> None:
+    """Of an end stop beside a cable of another form a third cogging was told, with 91 %."""
+    found = planted_row("end_stop", 20.0, 58, [*FORMS])
+    assert not [f for f in found["findings"] if f["mark"] == "wrong"]
+    assert any(f["effect"] == "cable_slab" for f in found["findings"])
 
 
 # A drive as many are: dry friction that sticks at each turn, and an encoder of a micrometre

@@ -60,14 +60,12 @@ def with_alone(effect: str, **values: float) -> MachineModel:
     return fitted().with_axis("x", axis).with_intervals("x", AxisIntervals(ends, 1.0))
 
 
-@pytest.mark.slow
 def test_an_effect_that_one_fit_has_alone_is_one_of_no_strength_in_the_other() -> None:
     found = agreement(fitted(), with_alone("constant_force", F0=0.2), FEW).axes["x"]
     assert found.only_in_b == ("constant_force",)
     assert found.differing == ["constant_force.F0"]
 
 
-@pytest.mark.slow
 def test_what_makes_no_force_where_the_axis_moves_has_no_cause() -> None:
     """Two stiffnesses of an end stop beyond the travel."""
     ends = {"low": -0.5, "high": 0.5}
@@ -100,7 +98,6 @@ def test_intervals_travel_with_the_file_and_leave_with_what_they_belong_to(tmp_p
             load_model(path, CATALOGUE)
 
 
-@pytest.mark.slow
 def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     save_model(fitted(), path)
@@ -113,7 +110,6 @@ def test_the_helper_for_other_peoples_tests_says_what_differs(tmp_path: Path) ->
         assert_agree(path, PROTON, catalogue=FEW)
 
 
-@pytest.mark.slow
 def test_the_command_ends_with_1_where_the_fits_differ(tmp_path: Path) -> None:
     save_model(fitted(), tmp_path / "a.toml")
     save_model(fitted(mass=12.0), tmp_path / "c.toml")

@@ -275,7 +275,6 @@ def test_gaps_and_the_seams_between_logs_do_not_count():
     assert test.bound_90 == pytest.approx(1.645 / np.sqrt(N - 500 + 300), rel=1e-3)
 
 
-@pytest.mark.slow
 def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
     logs = {"run": tracked(STAGE, 3, 12.0)}
 

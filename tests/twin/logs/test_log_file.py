@@ -227,7 +227,6 @@ print(peak() - before)
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="kB of memory as Linux counts them")
 def test_reading_needs_little_more_memory_than_the_result(tmp_path):
     """Resident, in a process of its own: what is freed in small pieces is not given back."""

@@ -161,7 +161,6 @@ def test_a_file_is_checked_as_its_log_is_and_read_at_a_lower_rate(tmp_path):
         assert_same_samples(read_measured(tmp_path / "a.mcap", fields, every), wanted)
 
 
-@pytest.mark.slow
 def test_a_log_too_long_to_hold_is_read_in_parts(tmp_path):
     """What a part leaves of a step goes to the next."""
     column = np.arange(2_520_001.0)
@@ -171,7 +170,6 @@ def test_a_log_too_long_to_hold_is_read_in_parts(tmp_path):
     assert_same_samples(got, thinned(log, 7))
 
 
-@pytest.mark.slow
 def test_a_log_too_long_to_hold_is_checked_in_parts(tmp_path):
     short = drive(rate=20_000.0, seconds=12.0).axes["x"].columns
     columns = {f: np.tile(short[f], 11)[:2_600_000] for f in ("position", "force")}

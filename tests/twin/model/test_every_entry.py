@@ -183,7 +183,6 @@ def test_every_entry_of_an_experiment_with_everything_wrong(kind: str) -> None:
             assert text is None or "\n" not in text
 
 
-@pytest.mark.slow
 def test_every_entry_of_a_map_with_everything_wrong(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text(MAP)
