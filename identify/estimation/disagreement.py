@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Dataset
 from identify.dataset.drive import parts_of
 from identify.dataset.odd_log import FEWEST, Disagreement, Otherwise, Recorded
-from identify.dataset.prepared_log import PreparedLog, moving, split_by_log
+from identify.dataset.prepared_log import PreparedLog, moving, split_by_log, sticks
 from identify.dataset.test_function import LOOK
 from identify.estimation.evidence import rms
 from identify.estimation.force_balance import averaged_force, jacobian, residual
@@ -45,7 +45,8 @@ class _Rows:
 
     recorded (n, 3): N per unit of each of Recorded. size (k + 3,): N per unit, by which the columns
     were divided; 1 of those of the recording. named (k + 3,): which of these may be another value
-    of one log; a point of a free curve is none. kept: which test functions tell.
+    of one log; a point of a free curve is none. kept: which test functions tell. going (n,): in
+    which of these no friction holds the axis at rest, of which no other log tells how much.
     """
 
     log: PreparedLog
@@ -57,6 +58,7 @@ class _Rows:
     size: Array
     named: NDArray[np.bool_]
     kept: NDArray[np.bool_]
+    going: NDArray[np.bool_]
 
     @cached_property
     def every(self) -> Array:
@@ -66,13 +68,14 @@ class _Rows:
     def predicted_by(self, others: Sequence[_Rows]) -> _Rows:
         """Those that a fit of other logs predicts no worse than they were measured.
 
-        By their leverage; a part of a free curve where others have not been, nobody predicts.
+        By their leverage; a part of a free curve where others have not been, nobody predicts, nor
+        what friction holds.
         """
         weak = RIDGE**2 * np.eye(self.columns.shape[1])
         gram = sum((r.columns.T @ r.columns for r in others), weak)
         leverage = np.sum(self.columns * np.linalg.solve(gram, self.columns.T).T, axis=1)
-        which = leverage < 1.0
-        names = ("left", "columns", "recorded", "states", "time")
+        which = (leverage < 1.0) & self.going
+        names = ("left", "columns", "recorded", "states", "time", "going")
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
@@ -182,7 +185,8 @@ def _worst(
 def _rows(
     axis: AxisModel, logs: Sequence[PreparedLog], where: Sequence[ParameterReference]
 ) -> list[_Rows]:
-    kept = split_by_log(moving(logs, _rests(axis)), logs)
+    kept = split_by_log(moving(logs, sticks(axis)), logs)
+    going = split_by_log(moving(logs, _rests(axis)), logs)
     left = split_by_log(residual(axis, logs), logs)
     slopes = jacobian(axis, logs, where)
     size = np.linalg.norm(slopes, axis=0)
@@ -194,10 +198,10 @@ def _rows(
     size = np.append(size, np.ones(len(Recorded)))
     curves = {f.effect.name for f in axis.effects if f.effect.is_nonparametric}
     named = np.array([*(w.effect not in curves for w in where), *(True for _ in Recorded)])
-    parts = zip(logs, left, columns, states, kept, strict=True)
+    parts = zip(logs, left, columns, states, kept, going, strict=True)
     return [
-        _Rows(g, r[k], c[k], _recorded(g)[k], s[k] / usual, g.time[k], size, named, k)
-        for g, r, c, s, k in parts if k.any()
+        _Rows(g, r[k], c[k], _recorded(g)[k], s[k] / usual, g.time[k], size, named, k, go[k])
+        for g, r, c, s, k, go in parts if k.any()
     ]  # fmt: skip
 
 
