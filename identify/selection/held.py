@@ -1,4 +1,4 @@
-"""Whether a free curve, found later, can make the force of a law that was found before it."""
+"""Whether a free curve, found later, can make the force of a law before it, or has emptied it."""
 
 from __future__ import annotations
 
