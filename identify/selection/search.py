@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from identify.dataset.dataset import Dataset
-from identify.dataset.prepared_log import PreparedLog
 from identify.estimation.alignment import begun_at, realigned, synchronised, time_origins
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
@@ -161,7 +161,7 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
     if part.channel_delay != dataset.channel_delay:
         dataset = realigned(dataset, part.channel_delay)
     dataset = begun_at(dataset, time_origins(part))
-    first, same = base, _are_same(given, dataset.training)
+    first, same = base, [*given] == [*dataset.training]
     if not same or rms(error_on(found.base.fit.axis, given)) < base.error:
         first = replace(fit_axis(found.base.fit.axis, dataset.training), begun=base.begun)
     judged = final = Judged(first, dataset)
@@ -169,10 +169,6 @@ def _on_whole(found: Found, base: Fit, dataset: Dataset) -> Found:
         fit = fit_axis(found.final.fit.axis, dataset.training)
         final = Judged(replace(fit, begun=base.begun), dataset)
     return replace(found, dataset=dataset, base=judged, final=final)
-
-
-def _are_same(some: Sequence[PreparedLog], others: Sequence[PreparedLog]) -> bool:
-    return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))
 
 
 def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
@@ -276,10 +272,10 @@ def on_final_dataset(final: Judged, found: Found) -> Found:
     so is that with the law that alone was found. What was decided, and by which score, stays; so
     does the part that all others leave.
     """
-    dataset, first = final.dataset, found.base
-    if not _are_same(first.fit.logs, dataset.training):
-        first = refitted_on(first.fit.axis, Judged(first.fit, dataset))
-    first = Judged(first.fit, dataset)
+    dataset = final.dataset
+    first = Judged(found.base.fit, dataset)
+    if [*first.fit.logs] != [*dataset.training]:
+        first = refitted_on(first.fit.axis, first)
 
     def candidate(one: Candidate) -> Candidate:
         if one.is_noise or _laws(one.fit) != _laws(final.fit):
@@ -475,16 +471,17 @@ def _needed(
     """The fit and the steps without earlier ones that are not accepted beside the later ones."""
     judged, steps = _less_replaced(judged, steps, first)
     for was in steps[:-1]:
-        fallen = has_collapsed(was.change, was.tried.judged, judged)
-        step = replace(was, held=was.held and not fallen)
+        fallen = partial(has_collapsed, was.change, was.tried.judged, judged)
+        step = replace(was, held=was.held and not fallen())
         steps = tuple(step if s is was else s for s in steps)
         if step.held or any(s.change.name == step.change.name for s in steps if s is not step):
             continue  # another change of this law presupposes it
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
         if axis is not None:
             without = refitted_on(axis, judged)
-            may = not (step.with_others or fallen)
-            if may and is_held(step.change, steps[-1].change, without, judged):
+            last = steps[-1].change
+            may = not step.with_others and is_held(step.change, last, without, judged)
+            if may and not fallen():
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
             needed = _is_needed(step.change, without, judged)

@@ -20,7 +20,7 @@ class Wraps:
     size: float
     rows: NDArray[np.intp]
 
-    def told(self, column: str) -> str:
+    def described(self, column: str) -> str:
         """What is wrong with a column of that name."""
         row = int(self.rows[0])
         more = and_more(len(self.rows))

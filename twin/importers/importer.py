@@ -234,7 +234,7 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     for axis, field, c in mapping.signals():
         found = find_wraps(columns[c.name])
         if c.wraps is None and found is not None:
-            facts[f"counter.{axis}.{field}"] = found.told(c.name)
+            facts[f"counter.{axis}.{field}"] = found.described(c.name)
         elif c.wraps is not None:
             said.append(f"column '{c.name}': a counter that begins again after {c.wraps:g} goes on")
             columns[c.name] = unwrapped(columns[c.name], c.wraps)

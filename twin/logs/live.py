@@ -130,7 +130,7 @@ class LiveTopics:
 
     def _take(self, message: str | bytes) -> None:
         if isinstance(message, str):
-            self._told_by_server(message)
+            self._by_server(message)
             return
         if len(message) < _HEAD.size or message[0] != _MESSAGE:
             return
@@ -139,7 +139,7 @@ class LiveTopics:
             self._arriving[channel].times.append(time)
             self._arriving[channel].payloads.append(message[_HEAD.size :])
 
-    def _told_by_server(self, text: str) -> None:
+    def _by_server(self, text: str) -> None:
         try:
             said = json.loads(text)
         except ValueError:

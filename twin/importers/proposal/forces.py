@@ -153,10 +153,10 @@ def _with_sign(file: File, axis: Axis, signal: Signal, motion: Explained) -> Axi
             f"reversed, as it moves the mass with its sign -1: {100.0 * motion.backward:.0f} % "
             f"explained, as it is {max(100.0 * motion.forward, 0.0):.0f} %"
         )
-        signal = replace(signal, sign=-1).told(why, Certainty.LIKELY)
+        signal = replace(signal, sign=-1).because(why, Certainty.LIKELY)
     elif motion.pushes:
         why = "it helps the motion where friction resists it: a part of the force is missing in it"
-        signal = signal.told(why, Certainty.UNSURE)
+        signal = signal.because(why, Certainty.UNSURE)
     axis = axis.having(signal)
     return axis if axis.motion else replace(axis, motion=motion, sign=sign)
 
@@ -207,7 +207,7 @@ def exchanged(file: File, axis: Axis) -> Axis:
     votes = {n.column: _votes(file, axis, position.name, n) for n in others}
     if setpoint is not None and votes[setpoint.column] > 0:
         why = f"rougher and later than {setpoint.column}, as a reading is"
-        return axis.having(position.told(why, Certainty.SURE))
+        return axis.having(position.because(why, Certainty.SURE))
     least = min(others, key=lambda n: votes[n.column], default=None)
     if (
         setpoint is not None
@@ -216,14 +216,14 @@ def exchanged(file: File, axis: Axis) -> Axis:
     ):
         why = f"although {setpoint.column} is later, as a reading is"
         return axis.having(
-            replace(position.told(why, Certainty.UNSURE), assumed="which of both is measured"),
+            replace(position.because(why, Certainty.UNSURE), assumed="which of both is measured"),
             replace(setpoint, certainty=Certainty.UNSURE, assumed="which of both is asked for"),
         )
     if least is None or votes[least.column] > -2:
         named = position.name.quantity is not None
         sure = named and axis.motion is not None and axis.motion.explains
         why = "its motion makes the force"
-        return axis.having(position.told(why, Certainty.SURE)) if sure else axis
+        return axis.having(position.because(why, Certainty.SURE)) if sure else axis
     why = f"although {position.column} is called so, that is smooth, and no force answers to it"
     return axis.having(
         Signal("position", least, Certainty.UNSURE, (why,)),

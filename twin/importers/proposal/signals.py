@@ -39,7 +39,7 @@ class Signal:
         """The name of the column."""
         return self.name.column
 
-    def told(self, reason: str, certainty: Certainty | None = None) -> Signal:
+    def because(self, reason: str, certainty: Certainty | None = None) -> Signal:
         """The same with one more reason."""
         return replace(self, reasons=(*self.reasons, reason), certainty=certainty or self.certainty)
 

@@ -150,12 +150,12 @@ def _of_setpoint(file: File, axis: Axis, signal: Signal) -> Entry:
         signal.name, abs(found.slope), found.likeness, unit
     )  # fmt: skip
     if found is not None and found.slope < 0.0:
-        signal = replace(signal.told("reversed against the position"), sign=-1)
+        signal = replace(signal.because("reversed against the position"), sign=-1)
     if own is not None and is_raw(own):
         return _without_scale(axis, signal, own, _angle_or_length(axis))
     if own is not None:
         told = f"as large as the position in {own}" if signal.name.unit is None else ""
-        signal = signal.told(told) if told else signal
+        signal = signal.because(told) if told else signal
         return Entry(signal, own) if stated or signal.name.unit else _assumed(axis, signal, own)
     said = f"one of it is {1.0 / found.slope:.4g} of the position" if found else "its unit is open"
     of = signal.name.unit or unit
@@ -180,7 +180,7 @@ def _of_velocity(file: File, axis: Axis, signal: Signal) -> Entry:
     family = ANGLES if base in ANGLES else LENGTHS
     for other in (own, *(f"{u}/s" for u in family), "rpm"):
         if near(rate_ratio(file, position, signal, base, other), SURE):
-            told = signal if other == own else signal.told(f"as large as the rate in {other}")
+            told = signal if other == own else signal.because(f"as large as the rate in {other}")
             return _assumed(axis, told, other)
     ratio = rate_ratio(file, position, signal, base, own)
     entry = _assumed(axis, signal, own)
