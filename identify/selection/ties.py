@@ -9,9 +9,10 @@ left without.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
+from identify.dataset.dataset import Dataset
 from identify.estimation.fit import fit_axis, fit_roughly
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
@@ -38,53 +39,70 @@ def with_ties(found: Found) -> Found:
     return found
 
 
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Logs as the final model leaves them, with a change that was found and without it."""
+
+    own: Tried
+    without: Judged
+
+
+def _beside(own: Tried, without: AxisModel, dataset: Dataset) -> _Beside:
+    final = own.judged
+    if dataset is not final.dataset:
+        final = refitted_on(final.fit.axis, replace(final, dataset=dataset))
+    return _Beside(replace(own, judged=final), refitted_on(without, final))
+
+
 def _compared_again(step: Step, found: Found) -> Found:
-    final = found.final
-    axis = step.change.undone(final.fit.axis, found.base.fit.axis)
+    final, taken = found.final, {s.change.name for s in found.steps}
+    axis, dataset = step.change.undone(final.fit.axis, found.base.fit.axis), final.dataset
     if axis is None:
         return _with_step(found, step, replace(step, tied=()), final)
-    without, own = refitted_on(axis, final), replace(step.tried, judged=final)
-    at_first, taken = _at_beginnings(own), {s.change.name for s in found.steps}
-    rivals = (t for t in _rivals(step, found) if t.change.name not in taken)
-    fitted = (_in_its_place(t, own, at_first, without) for t in rivals)
+    own = replace(step.tried, judged=final)
+    first, is_long = _beside(own, axis, dataset.part), dataset.part is not dataset
+    rivals = [t for t in _rivals(step, found) if t.change.name not in taken]
+    begun = [(t, list(_begun(t, first) if is_long else _starts(t, first))) for t in rivals]
+    whole = _beside(own, axis, dataset) if is_long and any(axes for _, axes in begun) else first
+    fitted = (_in_its_place(t, axes, whole) for t, axes in begun)
     tied = [t for t in fitted if t is not None]
     # Another shape of a law cannot lead, as it can imitate any that may be missing; nor does
     # what was found where its values cannot be its own and those of a rival can, nor what was
     # doubted: it would be doubted again, without an end.
     added = (t for t in tied if isinstance(t.change, Added))
     leading = [t for t in added if t.change.name not in found.barred]
-    is_own = not doubt(without, final.fit, own.change.effect, parameters(own.change))
+    is_own = not tied or not doubt(
+        whole.without, final.fit, own.change.effect, parameters(own.change)
+    )
     leader = simplest([own, *leading] if is_own or not leading else leading)
     others = tuple(t for t in ((own, *tied) if is_own else tied) if t is not leader)
     if leader is own:
         return _with_step(found, step, replace(step, tied=others), final)
     anew = fitted_anew(leader.judged)
-    if not doubt(without, anew.fit, leader.change.effect, parameters(leader.change)):
+    if not doubt(whole.without, anew.fit, leader.change.effect, parameters(leader.change)):
         leader = replace(leader, judged=anew)
     led = _with_step(found, step, replace(step, tried=leader, tied=others), leader.judged)
     return _less_replaced(step.change.name, led)
 
 
-def _at_beginnings(tried: Tried) -> Tried:
-    """The same as the beginnings of long logs have it; itself where the logs are short."""
-    judged = tried.judged
-    part = replace(judged, dataset=judged.dataset.part)
-    short = part.dataset is judged.dataset
-    return tried if short else replace(tried, judged=refitted_on(judged.fit.axis, part))
+def _starts(rival: Tried, beside: _Beside) -> Iterator[AxisModel]:
+    """Axes to fit a rival from in the place of what was found; a curve has its own values."""
+    axis = beside.without.fit.axis
+    if isinstance(rival.change, Added):
+        yield from (axis.with_effect(law) for law in _values_of(rival, beside.own))
+    elif rival.change.name in axis.names:
+        yield axis
 
 
-def _begun(rival: Tried, own: Tried, at_first: Tried, without: Judged) -> Iterator[AxisModel]:
-    """Axes to fit a rival from in its place; of long logs those that their beginnings leave level.
-
-    at_first: what was found, as these beginnings have it.
-    """
-    for law in _values_of(rival, own):
-        axis = without.fit.axis.with_effect(law)
-        if at_first is own:
-            yield axis
+def _begun(rival: Tried, first: _Beside) -> Iterator[AxisModel]:
+    """Of long logs, whose beginnings are ``first``, the same where they leave the rival level."""
+    for axis in _starts(rival, first):
+        if not isinstance(rival.change, Added):
+            if _curve(rival, first):
+                yield axis
             continue
-        there = refitted_on(axis, replace(without, dataset=at_first.judged.dataset))
-        if is_tied(replace(rival, judged=there), at_first):
+        there = refitted_on(axis, first.without)
+        if is_tied(replace(rival, judged=there), first.own):
             yield there.fit.axis
 
 
@@ -114,21 +132,19 @@ def _with_step(found: Found, old: Step, new: Step, final: Judged) -> Found:
     return replace(found, steps=steps, final=final)
 
 
-def _in_its_place(rival: Tried, own: Tried, at_first: Tried, without: Judged) -> Tried | None:
+def _in_its_place(rival: Tried, begun: Sequence[AxisModel], beside: _Beside) -> Tried | None:
     """A rival fitted in the place of what was found; None where it is none."""
-    if not isinstance(rival.change, Added):
-        return _curve(rival, own, without)
-    axes = _begun(rival, own, at_first, without)
-    return next((t for axis in axes if (t := _level(axis, rival, own, without))), None)
+    if isinstance(rival.change, Added):
+        return next((t for axis in begun if (t := _level(axis, rival, beside))), None)
+    return _curve(rival, beside) if begun else None
 
 
-def _curve(rival: Tried, own: Tried, without: Judged) -> Tried | None:
+def _curve(rival: Tried, beside: _Beside) -> Tried | None:
     """Another shape of a law, fitted beside all that was found; None where it is not level."""
-    if rival.change.name not in without.fit.axis.names:
-        return None
+    without = beside.without
     fit = replace(rival.change.refit(without, rival.screening), begun=without.fit.begun)
     again = replace(rival, judged=Judged(fit, without.dataset))
-    return again if is_tied(again, own) else None
+    return again if is_tied(again, beside.own) else None
 
 
 def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
@@ -140,8 +156,9 @@ def _values_of(rival: Tried, own: Tried) -> Iterator[Fitted]:
         yield as_free_as(own.judged.fit.axis[own.change.name], law)
 
 
-def _level(axis: AxisModel, rival: Tried, own: Tried, without: Judged) -> Tried | None:
+def _level(axis: AxisModel, rival: Tried, beside: _Beside) -> Tried | None:
     """A rival that is level with what was found, as this axis begins its fit; None if it is not."""
+    own, without = beside.own, beside.without
     dataset, effect = without.dataset, rival.change.effect
     rough = fit_roughly(axis, dataset.training)  # a better fit is no less level
     for fit in (lambda: rough, lambda: fit_axis(rough.axis, dataset.training)):
