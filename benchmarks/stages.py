@@ -20,8 +20,8 @@ from benchmarks.figures import Figure, Target
 from benchmarks.workload import AXIS, Workload, saved
 from identify import workflow
 from identify.estimation.variable_projection import absent_effects
-from identify.output.report import write_report
-from identify.output.report.subject import Subject
+from identify.output.shown.report import write_report
+from identify.output.shown.subject import Subject
 from identify.selection import doubts
 from identify.selection.trying import try_effect
 from twin.core.compiled import law_address

@@ -14,8 +14,8 @@ from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.experiment_design.planting import draw_effect, hidden_part, other_machine
 from identify.output.numbers import listed, quantity
-from identify.output.report import write_report
-from identify.output.report.subject import Subject
+from identify.output.shown.report import write_report
+from identify.output.shown.subject import Subject
 from identify.output.words.next_step import Source
 from identify.results.results import Diagnosis, Feedforward, OnMachine
 from identify.selection.diagnosis import AxisDiagnosis

@@ -14,7 +14,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from identify.output.machine import export_agreement_text
-from identify.output.text import agree_text
 from identify.results.results import FitResult
 from identify.workflow import agree
 from twin.effects import Catalogue, load_catalogue
@@ -38,7 +37,7 @@ def assert_agree(fit_a: Fitted, fit_b: Fitted, *, catalogue: Catalogue | None = 
     a, b = (load_model(f, known) if isinstance(f, str | Path) else f for f in (fit_a, fit_b))
     found = agree(a, b, catalogue=known)
     if not found.agree:
-        raise AssertionError(agree_text(found))
+        raise AssertionError(str(found))
 
 
 def assert_exported(

@@ -32,8 +32,7 @@ from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
 from identify.mechanism.departures import Departures, departures_of
-from identify.output.frequency import frequency_text as frequency_text  # results print themselves
-from identify.output.text import diagnose_text as diagnose_text
+from identify.output.printing import to_text as to_text  # results print themselves
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     AxisSummary,

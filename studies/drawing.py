@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
-from identify.output.report.page import Block
+from identify.output.blocks import Block
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType

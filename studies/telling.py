@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
+from identify.output.blocks import Row, TableBlock
 from identify.output.numbers import NOTHING, number, pretty, spaced
-from identify.output.report.page import Row, TableBlock
 from studies.drawing import INK, Picture, new_figure, plain_tick
 
 HEIGHT = 2.2  # inches of a row of panels

@@ -20,6 +20,7 @@ from identify.experiment_design.discrimination import SimulatedExperiment
 from identify.experiment_design.missing_excitation import Gap
 from identify.experiment_design.plan import Plan
 from identify.mechanism.bodies import WrongBody
+from identify.output.printing import to_text  # noqa: F401 - results print themselves
 from identify.results.grown import Addition
 from identify.results.results import (
     AxisSummary,

@@ -8,8 +8,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from identify import adding, workflow
-from identify.output.report import write_report
-from identify.output.report.subject import Subject
+from identify.output.shown.report import write_report
+from identify.output.shown.subject import Subject
 from identify.results.grown import Addition
 from identify.results.results import Comparison, Diagnosis, summary_of, with_all_found
 from identify.selection.diagnosis import AxisDiagnosis, Verdict

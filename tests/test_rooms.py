@@ -102,6 +102,12 @@ def test_output_computes_nothing(arrows) -> None:
                 assert not used, f"{name} has {used}"
 
 
+def test_what_writes_blocks_knows_no_result(arrows) -> None:
+    writers = {"identify.output.text", "identify.output.blocks", "identify.output.numbers"}
+    writers |= {n for n in arrows if n.startswith("identify.output.report")}
+    assert not {(n, other) for n in writers for other in arrows[n] - writers - {"identify.output"}}
+
+
 def test_no_module_of_the_machine_imports_identify() -> None:
     for name, path in modules(TWIN).items():
         assert "identify" not in {

@@ -129,7 +129,7 @@ def report(
     Example: twin fleet report --store fleet -o fleet.html
     """
     from identify.output.answers.fleet import FloorAnswer
-    from identify.output.report.fleet import write_fleet
+    from identify.output.shown.fleet import write_fleet
     from identify.output.words.fleet import floor_in_words
     from twin.engine import needed
 

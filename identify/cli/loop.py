@@ -146,7 +146,8 @@ def diagnose(
     """
     from identify import workflow
     from identify.output.as_json import answer_of
-    from identify.output.text import diagnose_text
+    from identify.output.shown.diagnoses import diagnosis_blocks
+    from identify.output.text import to_text
 
     machine, catalogue = loaded(model, effects)
     tell_first_look(machine, [*logs, *(holdout or ())], catalogue)
@@ -162,7 +163,7 @@ def diagnose(
         writes.append(partial(_save_with_bodies, done.result.model, better, machine))
     failed = tried(*writes)
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
-    text = diagnose_text(done.result, source)
+    text = to_text(diagnosis_blocks(done.result, source))
     warnings = [*done.warnings, *_of_rotors(machine, logs)]
     return Said(text, answer, warnings, unwritten=failed)
 
@@ -204,8 +205,8 @@ def _report(
 ) -> None:
     """Write the report of a result, with what its model says of the loop on these logs."""
     from identify import workflow
-    from identify.output.report import write_report
-    from identify.output.report.subject import Subject
+    from identify.output.shown.report import write_report
+    from identify.output.shown.subject import Subject
 
     result, before = done.result, None
     if isinstance(result, workflow.Diagnosis):

@@ -255,6 +255,5 @@ def tell_first_look(model: MachineModel, logs: Sequence[Path], catalogue: Catalo
 def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Said:
     """What a command says of a result; more: entries of its JSON object that the command knows."""
     from identify.output.as_json import answer_of
-    from identify.output.text import text_of
 
-    return Said(text_of(result), answer_of(result, **more), warnings, fine)
+    return Said(str(result), answer_of(result, **more), warnings, fine)

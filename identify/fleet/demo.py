@@ -15,7 +15,7 @@ from identify.fleet.models import Models
 from identify.fleet.nights import FORCE_ERROR
 from identify.fleet.state import floor_of
 from identify.fleet.store import Store
-from identify.output.report.fleet import write_fleet
+from identify.output.shown.fleet import write_fleet
 from identify.results.fleet import Alarm, Floor, Told
 from twin.engine import engine, outcomes
 from twin.files import make_folder, write_atomically

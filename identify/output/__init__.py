@@ -1,7 +1,8 @@
 """Results as text, JSON and HTML report; every sentence about a result is made here.
 
-Nothing here computes a result. ``words`` makes the sentences that text, JSON and report share; a
-section of the report is one module of ``report``. Pictures become files here.
+Nothing here computes a result. ``words`` makes the sentences that text, JSON and report share.
+``shown`` tells what is shown of each result, as ``blocks``; ``text`` writes blocks for a terminal,
+``report`` for a page or a notebook, and neither knows a result. Pictures become files here.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.force_along import force_along
+from identify.output.blocks import Block
 from identify.output.numbers import spaced
-from identify.output.report.page import Block
 from studies.drawing import BLUE
 from studies.telling import Line, Panel, picture, table
 from studies.thesis import study

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from identify.output.answers import plain
+from identify.output.blocks import AnswerBlock, Tone
 from identify.output.numbers import capitalised
-from identify.output.report.page import AnswerBlock, Section, Tone, page
+from identify.output.report.page import Section, page
 from studies.drawing import drawing_style
 from studies.telling import tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin

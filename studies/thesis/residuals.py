@@ -16,9 +16,9 @@ from identify.estimation.alignment import fit_aligned, realigned
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
+from identify.output.blocks import Block, Heading
 from identify.output.numbers import spaced
-from identify.output.report.page import Block, Heading
-from identify.output.report.residual import residual_test_blocks
+from identify.output.shown.residual import residual_test_blocks
 from identify.selection.diagnosis import diagnose_axis
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
 from studies.thesis import study

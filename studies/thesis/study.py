@@ -15,7 +15,7 @@ from identify.dataset.preparation import datasets
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
-from identify.output.report.page import Block
+from identify.output.blocks import Block
 from twin.effect import Effect, Kind
 from twin.effects import load_catalogue
 from twin.experiments.experiment import Experiment

@@ -20,8 +20,9 @@ from identify.cli import main
 from identify.cli.command import OUTPUTS, Command
 from identify.cli.shared import CheckedRecordings, Recordings, app
 from identify.output import as_json
-from identify.output import text as as_text
+from identify.output.blocks import blocks_of
 from identify.output.machine import briefly
+from identify.output.text import to_text
 from identify.output.words.next_step import Source
 from twin.checks import check_log
 from twin.effects import Catalogue, load_catalogue
@@ -331,7 +332,7 @@ def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch
     assert (slide / out).is_file()
     text = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, folder=slide).stdout
     source = () if name != "diagnose" else (Source(model="m.toml", options=TYPED),)
-    assert text.startswith(getattr(as_text, f"{name}_text")(found, *source))
+    assert text.startswith(to_text(blocks_of(found, *source)))
     if name in ("fit", "add"):
         again = load_model(slide / out, load_catalogue())
         assert again.axes["x"].names == found.model.axes["x"].names

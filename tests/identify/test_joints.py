@@ -34,7 +34,6 @@ from identify.dataset.preparation import datasets
 from identify.estimation.open_loop import open_loop
 from identify.mechanism.departures import departures_of
 from identify.output.as_json import answer_of
-from identify.output.text import text_of
 from identify.project.folder import Folder
 from identify.project.keeping import keep
 from identify.selection.diagnosis import diagnose_axis
@@ -400,7 +399,7 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     assert body.differing["inertia yy"][0] == pytest.approx(0.045, rel=0.02)
     assert not any(d.findings for d in found.axes.values())
     assert all(e.after < 0.05 * e.before for e in body.errors.values())
-    told = text_of(found)
+    told = str(found)
     assert told.startswith("The inertia of body fore is not as arm.xml has it (confidence 99 %)")
     assert answer_of(found).entries()["body"]["parameters"]["mass"]["unit"] == "kg"
     # The next command writes what is said into a copy of the file; then nothing is to be said.

@@ -16,7 +16,6 @@ from identify.dataset.prepared_log import moving
 from identify.dataset.spectrum import fitted_levels
 from identify.estimation.intervals import NotExcited
 from identify.estimation.offered import RestsTooOften
-from identify.output.text import diagnose_text
 from twin.errors import InputError
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 from twin.logs.log import LINEAR_UNITS
@@ -103,7 +102,7 @@ def test_nor_is_it_tried_and_the_answer_says_so():
     catalogue = few("coulomb_viscous", "quadratic_drag")
     found = workflow.diagnose(BARE, RESTING, catalogue=catalogue, test_function=LENGTH)
     assert found.not_tried == {"x": {"coulomb_viscous": RestsTooOften()}}
-    (note,) = [line for line in diagnose_text(found).splitlines() if "not tried" in line]
+    (note,) = [line for line in str(found).splitlines() if "not tried" in line]
     assert "coulomb_viscous, as the axis comes to rest within nearly every test function" in note
 
 
@@ -116,7 +115,7 @@ def test_such_a_log_tests_no_friction(caplog, role):
         )  # fmt: skip
     assert found.leading.named == ("coulomb_viscous",)
     assert "rests is left out: axis x comes to rest within" in caplog.text
-    assert "nan" not in diagnose_text(found)
+    assert "nan" not in str(found)
 
 
 # What a motion without force says
@@ -185,7 +184,7 @@ def test_what_acts_through_a_mass_is_not_tried_on_imposed_motion_and_the_answer_
     catalogue = few("coulomb_viscous", "load_dependent_friction", "payload_mass", "quadratic_drag")
     found = workflow.diagnose(rig, runs, catalogue=catalogue)
     assert set(found.not_tried["x"]) == {"load_dependent_friction", "payload_mass"}
-    (note,) = [line for line in diagnose_text(found).splitlines() if "not tried" in line]
+    (note,) = [line for line in str(found).splitlines() if "not tried" in line]
     assert "load_dependent_friction, payload_mass, as each acts through the motor" in note
     assert "mass = 0 kg says that the motion is imposed" in note
 

@@ -9,9 +9,8 @@ from machines import CATALOGUE, PROTON, one_axis
 
 from identify import diagnose, plan
 from identify.output.as_json import json_of
-from identify.output.report import sections
-from identify.output.report.subject import Subject
-from identify.output.text import diagnose_text, plan_text
+from identify.output.shown.report import sections
+from identify.output.shown.subject import Subject
 from identify.rules import RULE
 from identify.selection.diagnosis import Verdict
 from twin.effects import Catalogue
@@ -134,7 +133,7 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     assert following["experiment"]["kind"] in KINDS
     assert "rate of change of the motor force" in following["missing_motion"]
     assert following["expected_difference"] > 0.1 * following["noise_floor"]
-    assert "passes" in diagnose_text(found)
+    assert "passes" in str(found)
     subject = Subject("test", found)
     card = next(s for s in sections(subject) if s.anchor == "answer").blocks[0]
     assert any("twin plan" in remark for remark in card.remarks)
@@ -145,7 +144,7 @@ def test_what_no_motion_tells_apart_is_said():
     rivals = [CATALOGUE["constant_force"], CATALOGUE["asymmetric_friction"]]
     found = plan(one_axis(PROTON), between=rivals, catalogue=CATALOGUE, duration=4.0)
     assert not found.decides
-    assert "not decided" in plan_text(found)
+    assert "not decided" in str(found)
 
 
 def test_without_rivals_the_experiment_says_most_about_the_model():

@@ -18,7 +18,6 @@ from identify.experiment_design.discrimination import (
     require_within_limits,
 )
 from identify.output.as_json import json_of
-from identify.output.text import plan_text
 from identify.output.words.next_step import not_run_in_words
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
@@ -151,7 +150,7 @@ def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_ove
     assert any("too slowly for a test function of 0.02 s" in line for line in told)
     assert json_of(found)["not_run"] == told
     for reason in {n.reason for n in found.not_run}:  # once, however many experiments it is of
-        assert plan_text(found).count(reason) == 1
+        assert str(found).count(reason) == 1
     arena = arena_of(stage, test_function=0.02)
     trials, (first,) = contest(arena, [Passes("x", span=9.0, speed=0.2, repeats=1)])
     assert trials == []

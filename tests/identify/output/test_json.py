@@ -27,7 +27,7 @@ from identify.estimation.found_shape import FoundCurve, FoundShape, FreeExponent
 from identify.output.answers import Answer, answer_of, plain
 from identify.output.answers.machine import EffectAnswer, check_answer, laws_answer
 from identify.output.as_json import FILE, json_of, schema_text
-from identify.output.report import sections
+from identify.output.shown.report import sections
 from identify.printed import Printed, text_of
 from identify.results.grown import CorrectedBody
 from identify.selection.diagnosis import Verdict

@@ -21,9 +21,9 @@ from test_texts import TEXTS, of
 
 from identify.dataset.dataset import Role
 from identify.estimation.intervals import refusal
-from identify.output.report import SECTIONS, facts, sections
 from identify.output.report.page import page
-from identify.output.report.subject import Subject
+from identify.output.shown.report import SECTIONS, facts, sections
+from identify.output.shown.subject import Subject
 from identify.printed import Printed
 from identify.results.results import Comparison, Diagnosis, OnMachine
 from identify.selection.diagnosis import Verdict

@@ -19,9 +19,9 @@ from report_cases import Case, Outline
 from identify import workflow
 from identify.dataset.dataset import Role
 from identify.estimation.fit import Outcome, finished
-from identify.output.report.explorer import coordinate_of_answer, explored, shown_of
-from identify.output.report.page import Chart
-from identify.output.report.residual import regions
+from identify.output.blocks import Chart
+from identify.output.shown.explorer import coordinate_of_answer, explored, shown_of
+from identify.output.shown.residual import regions
 from identify.output.words.next_step import (
     Source,
     errors_of_step,

@@ -14,7 +14,8 @@ from browser import Browser, browser
 from report_cases import Case
 
 from identify import workflow
-from identify.output.report.page import Chart, Drawn, Line, Section
+from identify.output.blocks import Chart, Drawn, Line
+from identify.output.report.page import Section
 from identify.output.report.page import page as whole_page
 from twin.effects import Catalogue, load_catalogue
 from twin.model.machine import Fitted

@@ -6,6 +6,7 @@ they are committed: whatever has changed there has changed for a user.
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +25,6 @@ from identify.estimation.intervals import refusal
 from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
-from identify.output.text import text_of
 from identify.output.words.verdict import named_in_words
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
@@ -36,6 +36,7 @@ from twin.laws import verdict
 from twin.model.machine import Hindrance
 
 FILE = Path(__file__).parent / "texts.txt"
+IN_NOTEBOOK = ("fit", "two", "plan", "addition")  # a comparison and a diagnosis show their tables
 
 
 def refused_fit():
@@ -205,7 +206,7 @@ TEXTS: dict[str, Callable[[], object]] = {
 
 def texts() -> dict[str, str]:
     made_now = {name: result() for name, result in TEXTS.items()}
-    return {name: r if isinstance(r, str) else text_of(r) for name, r in made_now.items()}
+    return {name: str(r) for name, r in made_now.items()}
 
 
 def kept() -> dict[str, str]:
@@ -220,8 +221,17 @@ def test_there_is_a_text_of_every_result() -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_text_is_as_it_was_read(name: str) -> None:
     result = TEXTS[name]()
-    text = result if isinstance(result, str) else text_of(result)
+    text = str(result)
     assert text.splitlines() == kept()[name].splitlines()
+
+
+@pytest.mark.parametrize("name", [n for n in TEXTS if n.partition(" ")[0] in IN_NOTEBOOK])
+def test_a_notebook_shows_every_number_of_the_text(name: str) -> None:
+    result = TEXTS[name]()
+    shown = re.sub(r"\s+", " ", re.sub("<.*?>", " ", html.unescape(result._repr_html_())))
+    numbers = re.findall(r"\d+\.\d+", str(result))
+    assert numbers
+    assert not [n for n in numbers if n not in shown]
 
 
 if __name__ == "__main__":

@@ -29,10 +29,10 @@ from identify import adding, workflow
 from identify.dataset.coordinates import coordinates_of
 from identify.dataset.preparation import datasets
 from identify.estimation.residual_dependence import unit_of
-from identify.output import as_json, text
+from identify.output import as_json
 from identify.output.answers import plain
-from identify.output.report import write_report
-from identify.output.report.subject import Subject
+from identify.output.shown.report import write_report
+from identify.output.shown.subject import Subject
 from identify.results.grown import Addition
 from identify.results.results import Diagnosis, FitResult
 from twin.checks import check_log
@@ -115,8 +115,8 @@ def said(value: object) -> Iterator[str]:
 
 def texts(r: Round) -> str:
     shown = (
-        text.fit_text(r.fitted), text.compare_text(r.found.comparison),
-        text.diagnose_text(r.found), text.add_text(r.added), format_model(r.added.model),
+        str(r.fitted), str(r.found.comparison),
+        str(r.found), str(r.added), format_model(r.added.model),
     )  # fmt: skip
     return "\n".join(shown)
 
@@ -197,7 +197,7 @@ def test_an_effect_of_the_other_axis_is_no_candidate_where_there_are_several(gon
     assert told["not_tried"] == list(left_out)
     notes = [n for n in told["notes"] if "not tried" in n]
     assert bool(notes) == bool(left_out)
-    assert ("not tried: axis_coupling" in text.diagnose_text(gone_round.found)) == bool(left_out)
+    assert ("not tried: axis_coupling" in str(gone_round.found)) == bool(left_out)
     tried = {c.effect.name for c in gone_round.found.leading.ranking}
     assert ("axis_coupling" in tried) == (not left_out)
 
@@ -259,7 +259,7 @@ def test_a_plan_is_in_units_of_the_axis() -> None:
         model, catalogue=CATALOGUE, duration=2.0, axis="c",
         between=(CATALOGUE["cogging"], CATALOGUE["quadratic_drag"]),
     )  # fmt: skip
-    shown = text.plan_text(chosen)
+    shown = str(chosen)
     assert not (wrong := OF_A_SLIDE.search(shown)), wrong
     assert "N·m RMS unexplained" in shown
     assert stated_units(as_json.json_of(chosen)) == {"N m", "s"}

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from identify.dataset.dataset import Role
 from identify.estimation.found_shape import FoundShape
-from identify.estimation.intervals import Estimate, ModelWrong
-from identify.output.candidates import CandidateRow, columns_of, row_of, values_in_words
-from identify.output.numbers import (
-    NOTHING,
-    DisplayUnit,
-    capitalised,
-    percent,
-    quantity,
-    spaced,
-    title_case,
-)
-from identify.output.report.page import (
+from identify.output.blocks import (
     Block,
     Chart,
     Drawn,
@@ -31,13 +20,21 @@ from identify.output.report.page import (
     TableBlock,
     Tone,
 )
-from identify.output.report.subject import AxisView, Subject
+from identify.output.candidates import CandidateRow, columns_of, row_of, values_in_words
+from identify.output.numbers import (
+    NOTHING,
+    DisplayUnit,
+    capitalised,
+    percent,
+    quantity,
+    spaced,
+    title_case,
+)
+from identify.output.shown.fits import fit_table
+from identify.output.shown.subject import AxisView, Subject
 from identify.output.words.diagnosis import tested_on
 from identify.output.words.findings import shape_in_words
 from identify.output.words.fit import (
-    common_reason,
-    estimate_in_words,
-    no_interval_in_words,
     nonparametric_in_words,
 )
 from identify.output.words.next_step import errors_of_step
@@ -274,35 +271,3 @@ def given_table(axis: AxisModel) -> list[Block]:
     ]
     caption = "Values of the given model; twin fit adds intervals."
     return [TableBlock(("Parameter", "Value", "Meaning"), rows, caption)]
-
-
-def fit_table(
-    axis: AxisModel,
-    sides: Mapping[str, Sequence[Estimate]],
-    floor: float,
-    new: Collection[str] = (),
-) -> list[Block]:
-    """Values of fits by their headings, with intervals; nothing where curves are all there is.
-
-    new: labels that stand out. floor: the one noise floor that is told, N.
-    """
-    hidden = nonparametric_labels(axis)
-    meanings = {c.label: c.parameter.meaning for c in all_parameters(axis)}
-    labels = dict.fromkeys(e.label for known in reversed([*sides.values()]) for e in known)
-    titles, remarks, cells = ["Parameter"], [], {n: [n] for n in labels if n not in hidden}
-    for heading, known in sides.items():
-        # Where all values have the same reason, it is in the caption instead of a column.
-        common, by_label = common_reason(known), {e.label: e for e in known}
-        titles += [heading] if common else [heading, "90 % interval"]
-        if isinstance(common, ModelWrong):
-            common = replace(common, floor=floor)
-        if common:
-            remarks.append(f"{heading}: {no_interval_in_words(common)}.")
-        for name, row in cells.items():
-            both = estimate_in_words(by_label[name]) if name in by_label else (NOTHING, "")
-            row += both[: 1 if common else 2]
-    rows = [
-        Row((*row, meanings.get(name, "")), Tone.STRONG if name in new else Tone.PLAIN)
-        for name, row in cells.items()
-    ]
-    return [TableBlock([*titles, "Meaning"], rows, " ".join(remarks))] if rows else []

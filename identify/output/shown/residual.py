@@ -7,6 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from identify.estimation.residual_dependence import Dependence
+from identify.output.blocks import (
+    Block,
+    Chart,
+    Drawn,
+    Ink,
+    Line,
+    Listing,
+    Row,
+    TableBlock,
+)
 from identify.output.numbers import (
     DisplayUnit,
     capitalised,
@@ -16,8 +26,7 @@ from identify.output.numbers import (
     quantity,
     spaced,
 )
-from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
-from identify.output.report.subject import AxisView, Subject
+from identify.output.shown.subject import AxisView, Subject
 from identify.output.words.fit import (
     LEAST_SHARE,
     LOOPS,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identify.dataset.dataset import Role
 from identify.output import INKS
 from identify.output.numbers import DisplayUnit, packed, quantity, spaced, title_case, typeset
-from identify.output.report.subject import AxisView, Subject
+from identify.output.shown.subject import AxisView, Subject
 from identify.results.results import Comparison, Diagnosis
 from identify.results.signals import Signals, means
 from twin.curve import Coordinate

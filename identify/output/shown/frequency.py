@@ -1,4 +1,4 @@
-"""A frequency response as text and as a Bode diagram."""
+"""What is shown of a frequency response: what is read off it, and its Bode diagram."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.frequency.plant import Banded, Plant
 from identify.output import INKS
+from identify.output.blocks import Block, Sentence, blocks_of, sentences
 from identify.output.numbers import listed, number, percent, pretty, with_band
-from identify.printed import figure_of, text_of
+from identify.printed import figure_of
 from identify.results.frequency import FrequencyResponse, by_source
 from twin.model.units import AxisUnits
 
@@ -20,18 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@text_of.register
-def frequency_text(result: FrequencyResponse) -> str:
+@blocks_of.register
+def frequency_blocks(result: FrequencyResponse) -> list[Block]:
     """By axis what the logs show, and the model in their place."""
-    lines = [f"force to position, from {listed(result.logs)}"]
+    blocks = sentences([f"force to position, from {listed(result.logs)}"])
     for name, axis in result.axes.items():
-        lines.append(f"axis {name}")
+        below: list[str | Block] = []
         for source, shown in by_source(axis).items():
             how = ", in simulation on the same setpoint" if source == "model" else ""
-            lines.append(f"  {source}{how}")
-            lines += [f"    {what}: {value}" for what, value in read_off(shown, axis)]
-        lines.append(f"  {_caution(axis)}")
-    return "\n".join(lines)
+            facts = (f"{what}: {value}" for what, value in read_off(shown, axis))
+            below.append(Sentence.over(f"{source}{how}", facts))
+        blocks.append(Sentence.over(f"axis {name}", [*below, _caution(axis)]))
+    return blocks
 
 
 def _caution(axis: AxisFrequency) -> str:

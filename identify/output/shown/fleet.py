@@ -8,6 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from identify.output.blocks import (
+    AnswerBlock,
+    Block,
+    Chart,
+    Drawn,
+    Ink,
+    Line,
+    Listing,
+    TableBlock,
+    Tile,
+    Tone,
+)
 from identify.output.numbers import (
     NOTHING,
     DisplayUnit,
@@ -16,19 +28,7 @@ from identify.output.numbers import (
     number,
     quantity,
 )
-from identify.output.report.page import (
-    AnswerBlock,
-    Block,
-    Chart,
-    Drawn,
-    Ink,
-    Line,
-    Listing,
-    Section,
-    TableBlock,
-    Tile,
-    Tone,
-)
+from identify.output.report.page import Section
 from identify.output.report.page import page as whole_page
 from identify.output.words.fleet import (
     alarm_in_words,

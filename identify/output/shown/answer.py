@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from identify.dataset.dataset import Role
 from identify.mechanism.bodies import WrongBody
+from identify.output.blocks import AnswerBlock, Block, Listing, Tile, Tone
 from identify.output.machine import minor
 from identify.output.numbers import DisplayUnit, arrow, capitalised, number, quantity, spaced
-from identify.output.report.page import AnswerBlock, Block, Listing, Tile, Tone
-from identify.output.report.subject import AxisView, Subject
+from identify.output.shown.subject import AxisView, Subject
 from identify.output.words.diagnosis import Said, tested_on
 from identify.output.words.fit import refit_in_words
 from identify.output.words.next_step import (

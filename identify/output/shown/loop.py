@@ -7,10 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency
-from identify.output.frequency import read_off
+from identify.output.blocks import (
+    Block,
+    Chart,
+    Drawn,
+    Ink,
+    Line,
+    Listing,
+    Row,
+    TableBlock,
+)
 from identify.output.numbers import NOTHING, by_how_much, listed, pretty, quantity
-from identify.output.report.page import Block, Chart, Drawn, Ink, Line, Listing, Row, TableBlock
-from identify.output.report.subject import AxisView
+from identify.output.shown.frequency import read_off
+from identify.output.shown.subject import AxisView
 from identify.results.frequency import by_source
 
 

@@ -1,0 +1,1 @@
+"""What is shown of each result: blocks, of which text, notebook and page are made."""
