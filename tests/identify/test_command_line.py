@@ -333,6 +333,8 @@ def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch
     text = twin(name, *ARGUMENTS[name], *COMMON, "-o", out, folder=slide).stdout
     source = () if name != "diagnose" else (Source(model="m.toml", options=TYPED),)
     assert text.startswith(to_text(blocks_of(found, *source)))
+    if name == "add":
+        assert (found.position_log is None) == (found.position_error is None)
     if name in ("fit", "add"):
         again = load_model(slide / out, load_catalogue())
         assert again.axes["x"].names == found.model.axes["x"].names

@@ -72,6 +72,14 @@ def test_its_answer_as_json(recording):
     assert answer["proofs"]["x"]["explained"] > 0.99
 
 
+def test_a_column_that_is_taken_for_nothing_is_shown(tmp_path):
+    noise = np.random.default_rng(1).normal(size=len(T))
+    path = written(tmp_path, "time_s,pos_mm,force_N,x7", 1e3 * X, F, noise)
+    answer = valid(json.loads(twin("import", path.name, "--json", folder=tmp_path).stdout))
+    taken = {c["column"]: (c["axis"], c["field"]) for c in answer["columns"]}
+    assert taken == {"pos_mm": ("x", "position"), "force_N": ("x", "force"), "x7": (None, None)}
+
+
 def test_what_is_not_known_is_left_open_and_asked_for(tmp_path):
     written(tmp_path, "t,pos [mm],torque [%]", 1e3 * X, F)
     done = twin("import", "run 1.csv", "--yes", folder=tmp_path)

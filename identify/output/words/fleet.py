@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from identify.output.blocks import Row, TableBlock
 from identify.output.numbers import NOTHING, listed, number, percent, quantity, with_band
+from identify.output.text import to_text
 from identify.results.fleet import (
     Alarm,
     Floor,
@@ -33,10 +35,7 @@ def ingested_in_words(done: Ingested) -> str:
 
 def table_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A table for the terminal, its columns one beside the other."""
-    lines = [list(columns), *([_cell(value) for value in row] for row in rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(columns))]
-    return "\n".join("  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
-                     for line in lines)  # fmt: skip
+    return to_text([TableBlock(columns, [Row([_cell(value) for value in row]) for row in rows])])
 
 
 def _cell(value: Any) -> str:

@@ -184,6 +184,20 @@ def begun(jobs: Jobs, number: int) -> int:
     return int(jobs.jobs[number].process or 0)
 
 
+def test_of_many_jobs_the_last_ones_are_remembered_and_the_files_of_others_go(jobs):
+    for number in range(1, queue.KEPT + 1):
+        ended = {"number": number, "words": ["check"], "state": "done", "code": 0}
+        (jobs.place / f"{number}.json").write_text(json.dumps(ended))
+        (jobs.place / f"{number}.out").write_text("")
+    again = Jobs(jobs.folder)
+    last = again.add(["print(1)"])
+    again.wait(last.number, 10.0)
+    again.close()
+    assert sorted(again.jobs) == list(range(2, queue.KEPT + 2))
+    assert not list(again.place.glob("1.*"))
+    assert (again.place / "2.out").is_file()
+
+
 def test_what_ended_with_the_server_is_told_by_the_next_one(jobs):
     place = jobs.place / "7.json"
     place.write_text(json.dumps({"number": 7, "words": ["diagnose"], "state": "running"}))

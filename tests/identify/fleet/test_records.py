@@ -51,6 +51,7 @@ def test_each_log_is_a_record_with_a_row_a_free_parameter(logs, tmp_path) -> Non
     mass = next(row for row in fits if row["parameter"] == "mass")
     assert mass["unit"] == "kg"
     assert mass["low"] < mass["value"] < mass["high"]
+    assert mass["no_interval"] is None
     assert mass["error"] >= mass["floor"] > 0.0
     assert mass["distance"] > 0.1
     assert mass["duration"] == pytest.approx(3.0)

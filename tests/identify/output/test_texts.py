@@ -10,6 +10,7 @@ import html
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import built_results as made
@@ -25,7 +26,20 @@ from identify.estimation.intervals import refusal
 from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
+from identify.output.words import fleet as words
 from identify.output.words.verdict import named_in_words
+from identify.results.fleet import (
+    Alarm,
+    Floor,
+    Ingested,
+    KindParameter,
+    LiveAlarm,
+    LiveCause,
+    LiveParameter,
+    MachineState,
+    Off,
+    Scope,
+)
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement
@@ -135,6 +149,30 @@ LAWS = [
 ]
 LATE = LogFinding(Severity.WARNING, Fault.LAG, "y", "the what", Place(1.5, 2.0, 3), "the remedy")
 
+DAYS = [date(2026, 3, day) for day in range(1, 7)]
+ALARM = Alarm(
+    "m1", "x", "stage", "lugre.Fc", "N", DAYS[5], DAYS[3], DAYS[2], DAYS[4], before=1.3, after=1.7,
+    size=0.4, half_width=0.03, strength=7.1, scope=Scope.MACHINE, trend=0.011, others=("mass",),
+)  # fmt: skip
+HALL = replace(
+    ALARM, machine=None, parameter="force_error", after=0.9, size=-0.4, trend=None, others=()
+)
+OFF = Off("m2", "y", "lugre.Fc", "N", 2.3, 1.9, 4.7)
+KIND = KindParameter("x", "lugre.Fc", "N", 1.37, 0.12, 9, 1.41, 0.05)
+LIVE = LiveAlarm("x", 9.7, 8.3, 0.023, 0.041, "N")
+CAUSES = (
+    LiveCause("x", 8.3, ("cogging", "wear")), LiveCause("x", 8.3, ()),
+    LiveCause("x", 8.3, (), failed="too few logs"),
+)  # fmt: skip
+
+
+def floor() -> Floor:
+    """One machine with an alarm and bad logs, one that is off from its kind."""
+    first = MachineState("m1", "stage", 5, DAYS[5], 2, 1.1, (ALARM,), ())
+    second = MachineState("m2", "stage", 5, DAYS[5], 0, 1.0, (), (OFF,))
+    return Floor(Path("store"), (first, second), (HALL,), {}, {ALARM: ("wear",)}, ())
+
+
 TEXTS: dict[str, Callable[[], object]] = {
     "fit": made.fit_result,
     "fit, intervals refused": refused_fit,
@@ -196,6 +234,23 @@ TEXTS: dict[str, Callable[[], object]] = {
         made.diagnosis_of(
             findings=(replace(COGGING, tied=("lugre",)), replace(LUGRE, tied=("cogging",)))
         )
+    ),
+    "fleet: what became of logs": lambda: words.ingested_in_words(
+        Ingested(Path("logs"), Path("store"), 12, 7, 3, 2, 0)
+    ),
+    "fleet: how machines stand": lambda: words.floor_in_words(floor()),
+    "fleet: what a machine needs attention for": lambda: words.state_in_words(
+        floor().machines[0]
+    ),
+    "fleet: a table": lambda: words.table_text(("machine", "Fc"), (("m1", 1.25), ("m12", None))),
+    "fleet: a kind": lambda: words.kind_in_words("stage", [KIND], "m1"),
+    "live": lambda: "\n".join(
+        [
+            words.live_in_words(LIVE),
+            words.live_in_words(replace(LIVE, after=0.011)),
+            *map(words.cause_in_words, CAUSES),
+            words.parameter_in_words(LiveParameter("lugre.Fc", 1.5, 0.02, 1.31, "N")),
+        ]
     ),
     "catalogue": lambda: effects_text([CATALOGUE["wear"], CATALOGUE["gms"]]),
     "effect": lambda: effect_text(CATALOGUE["coulomb_viscous"]),

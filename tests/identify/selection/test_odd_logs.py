@@ -153,6 +153,21 @@ def test_a_push_is_told_with_its_time() -> None:
     assert 1.9 < odd.span[0] <= odd.span[1] < 2.3
 
 
+def test_what_shakes_a_third_of_a_log_is_told_with_its_time() -> None:
+    def shaken(force: np.ndarray) -> np.ndarray:
+        t = np.arange(len(force)) / RATE
+        return force + np.where((t > 1.5) & (t < 3.5), 2.0 * np.sin(25.0 * t), 0.0)
+
+    logs = runs()
+    odd = fitted({**logs, "run1": with_force(logs["run1"], shaken)}).odd
+    assert odd is not None
+    assert odd.log == "run1"
+    assert odd.otherwise is None
+    assert odd.span is not None
+    assert 1.4 < odd.span[0] < 1.7
+    assert 2.9 < odd.span[1] < 3.6
+
+
 def test_a_glitch_at_rest_is_told_and_costs_no_log() -> None:
     logs = runs()
     speed = RIDES["run1"].speed()

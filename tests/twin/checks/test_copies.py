@@ -13,6 +13,7 @@ import pytest
 from scipy.signal import decimate
 
 from twin.checks.copies import copies
+from twin.checks.same_samples import step_of
 from twin.logs import AxisLog, Log
 from twin.logs.log import Array, thinned
 
@@ -199,3 +200,10 @@ def test_what_holds_of_one_axis_does_not_hold_of_both() -> None:
     other = replace(both, axes={**both.axes, "y": run("fine", 3).axes["x"]})
     assert copies({"a": both, "b": both})
     assert not copies({"a": both, "b": other})
+
+
+@pytest.mark.parametrize(("moves", "step"), [(2, 0.0), (30, 0.1)])
+def test_a_few_changes_tell_no_step(moves: int, step: float) -> None:
+    """By chance they are multiples of the least."""
+    places = np.repeat(0.1 * np.arange(moves + 1), 10)
+    assert step_of(places) == pytest.approx(step)
