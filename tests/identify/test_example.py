@@ -102,7 +102,6 @@ def test_every_example_file_is_offered_and_travels_with_the_package() -> None:
     assert included["examples"] == "twin/example_files"
 
 
-@pytest.mark.slow
 def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     own = MachineModel("s", {"x": replace(SLIDE, hardware=HARDWARE)}, 1000.0)
     save_model(own, tmp_path / "m.toml")
@@ -135,7 +134,6 @@ def test_a_demonstration_hides_what_it_finds_again(tmp_path):
     assert "cannot be made" in refusal(*asked[:1], "-o", "m.toml/in", folder=tmp_path)
 
 
-@pytest.mark.slow
 def test_only_what_shows_is_hidden():
     model = MachineModel("m", {"x": axis_of(fitted("cogging"))}, 1000.0)
     names = ("cogging", "constant_force", "gms", "encoder_delay", "periodic_disturbance")

@@ -142,7 +142,6 @@ def test_differences_are_drawn_so_large_that_they_are_seen(shown) -> None:
     assert 0.02 < drawn < 0.5
 
 
-@pytest.mark.slow
 def test_the_page_moves_in_a_browser(shown, chrome, tmp_path) -> None:
     write_page(tmp_path / "page.html", shown, shown.gain, 2.0)
     found = found_in(chrome, tmp_path / "page.html", """
@@ -187,7 +186,6 @@ def jointed(text: str) -> Replay:
     return replay(model, arm_log(1, duration=2.0), "log")
 
 
-@pytest.mark.slow
 def test_joints_stand_as_tendons_say() -> None:
     axes = {axis: AxisModel(0.0, rotary=True, joint=joint) for axis, joint in MOTORS.items()}
     log = coupled_log(1).part(0, 500)
@@ -220,7 +218,6 @@ def of_kind(kind: str) -> Replay:
     return replay(plain, simulate(plain, "tracking", seed=2, duration=1.5), "log")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mesh", "arm", *MACHINES])
 def test_each_body_of_the_page_is_where_mujoco_has_it(kind, chrome, tmp_path) -> None:
     what = of_kind(kind)
@@ -270,7 +267,6 @@ def test_what_cannot_be_shown_is_one_line(folder, monkeypatch) -> None:
         assert "no display" in refusal("view", "l.mcap", folder=folder)
 
 
-@pytest.mark.slow
 def test_a_video_without_what_draws_is_one_line(folder, monkeypatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "pencil")
     done = process("view", "l.mcap", "--video", "v.mp4", folder=folder)
@@ -280,7 +276,6 @@ def test_a_video_without_what_draws_is_one_line(folder, monkeypatch) -> None:
     assert not (folder / "v.mp4").exists()
 
 
-@pytest.mark.slow
 def test_a_video_has_pictures_that_differ(folder) -> None:
     command = ("view", "l.mcap", "proton_xy", "--video", "v.mp4", "--speed", 30)
     done = process(*command, folder=folder)

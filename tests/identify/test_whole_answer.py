@@ -44,7 +44,6 @@ def beyond(found: AxisDiagnosis) -> set[str]:
     return {n for n in final.names if n not in base.names} | freed
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", HELD)
 def test_every_law_of_the_final_model_belongs_to_a_finding(name: str) -> None:
     logs = [{f"{i}": logged(HELD[name], Ride(i))} for i in (1, 2, 3)]
@@ -89,7 +88,6 @@ def errors_of(model: Path, folder: Path) -> tuple[float, float]:
     return again.fits["x"].error, again.test_error["x"]
 
 
-@pytest.mark.slow
 def test_the_model_that_is_written_leaves_the_error_that_was_told(drive: Path, answer: dict):
     told = answer["force_error_with_found"], answer["test_error_after"]
     assert answer["test_error_after"] < 0.05 * answer["test_error_before"]
@@ -165,7 +163,6 @@ def test_the_next_command_is_done_once_the_model_is_written(drive: Path, answer:
     assert "Missing:" not in done
 
 
-@pytest.mark.slow
 def test_a_model_keeps_the_length_that_its_errors_were_told_at(drive: Path, tmp_path: Path) -> None:
     """Beside it every command tells them, where the samples of the logs allow that length."""
     axis = replace(machine(16.0, cogging=COGGING), test_function=0.05)

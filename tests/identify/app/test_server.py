@@ -217,7 +217,6 @@ def tiny(tmp_path):
     subprocess.run(["umount", str(disk)], check=True)
 
 
-@pytest.mark.slow  # two processes
 def test_a_full_disk_is_told_in_a_sentence_and_nothing_is_half_written(tiny):
     folder = Folder(tiny)
     folder.begin()

@@ -169,7 +169,6 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
 
 
-@pytest.mark.slow
 def test_held_out_logs_that_share_little_test_all_the_same() -> None:
     assert dataset_of(0.2).beyond == {}
     assert set(dataset_of(0.2, 0.0).beyond) == {"held 0"}  # together they share half

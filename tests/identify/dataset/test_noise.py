@@ -57,7 +57,6 @@ def log_of_drive(name, seed=2, duration=8.0):
     return run(machine, seed, duration)
 
 
-@pytest.mark.slow  # as the others of `drawn`: the second simulator is compiled in ten seconds
 @pytest.mark.parametrize("length", [0.1, 0.2])
 @pytest.mark.parametrize("drive", DRIVES)
 def test_the_floor_is_what_the_true_model_leaves(drive, length):
@@ -76,7 +75,6 @@ def test_the_floor_is_what_the_true_model_leaves(drive, length):
         assert floor.parts["aliasing"] == 0.0
 
 
-@pytest.mark.slow
 def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     machine = drawn(np.random.default_rng(3), 10e3, resolution=5e-7, encoder_noise=0.0)
     fit = workflow.fit(STAGE, {"log": run(machine, 3, 8.0)}, test_function=0.1).fits["x"]
@@ -88,7 +86,6 @@ def test_steps_of_the_readings_are_a_part_where_the_axis_has_them():
     assert blind.high > knowing.value
 
 
-@pytest.mark.slow
 def test_rounding_at_even_speed_is_no_aliasing():
     """A tone of rounding beside another looks like the dip of a thinned log; below it is quiet."""
     stage = STAGE

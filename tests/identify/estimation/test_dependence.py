@@ -115,7 +115,6 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     assert "by 57 degrees" in words
 
 
-@pytest.mark.slow
 def test_a_force_with_another_phase_in_each_log_is_told():
     def log(phase, name, pitch=2.3e-3, size=0.3):
         m = ridden(lambda m: size * np.sin(2.0 * np.pi * m.position / pitch + phase))
@@ -354,7 +353,6 @@ def dataset():
     return dataset_of(*logs[:2], holdout=(logs[2],))
 
 
-@pytest.mark.slow
 def test_a_log_begun_later_has_its_clock_later_modulo_the_period(dataset):
     axis = STAGE.with_effect(REST)
     wanted = np.mod(LATE * 23.7 + 0.5, 1.0) - 0.5

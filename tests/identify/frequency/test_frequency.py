@@ -62,7 +62,6 @@ def test_mass_resonance_and_delay_are_read_off(setpoint: Setpoint, delay: float)
     assert mode.gain.value == pytest.approx(machine.load / machine.motor, rel=0.05)
 
 
-@pytest.mark.slow
 def test_the_ratio_of_spectra_is_biased_under_feedback_where_the_instrument_is_not() -> None:
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
     records = [recorded(wandering, noisy, seed) for seed in range(3)]
@@ -102,7 +101,6 @@ def test_the_margins_are_those_of_the_loop() -> None:
     assert told.phase_margin == pytest.approx(np.angle(-exact[falls]), abs=0.1)
 
 
-@pytest.mark.slow
 def test_where_the_setpoint_makes_none_of_the_force_nothing_is_told() -> None:
     """There the ratio is that of noise, which feedback makes: as sure as it is wrong."""
     noisy = replace(MACHINE, noise=5e-5, load=1e-3)
@@ -128,7 +126,6 @@ sigma2 = 8.0
 """
 
 
-@pytest.mark.slow
 def test_no_mass_is_read_off_where_not_even_that_of_the_model_comes_back(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(RUBBING)
     model = load_model(tmp_path / "m.toml")
@@ -181,7 +178,6 @@ def geared(request: pytest.FixtureRequest) -> tuple[TwoMasses, list[Log]]:
     return machine, logs
 
 
-@pytest.mark.slow
 def test_an_elastic_gear_is_seen_through_and_named(geared: tuple[TwoMasses, list[Log]]) -> None:
     machine, logs = geared
     plant = identify.frequency_response(logs).axes["q"].measured.plant
@@ -277,7 +273,6 @@ def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
         identify.frequency_response(path)
 
 
-@pytest.mark.slow
 def test_a_response_is_python_controls_frd() -> None:
     control = pytest.importorskip("control")
     record = recorded(wandering)

@@ -75,7 +75,6 @@ def test_beside_a_force_of_position_another_is_more_of_it():
     assert set(told.values()) == {FindingKind.RESEMBLES}
 
 
-@pytest.mark.slow
 def test_what_a_free_curve_misses_between_its_knots_is_no_cogging():
     """A spring of another shape, and with 99 % two coggings of 4 mN, three knots a period."""
     true = having(SLIDE, "cogging", p=0.0545, a1=0.4)
@@ -83,7 +82,6 @@ def test_what_a_free_curve_misses_between_its_knots_is_no_cogging():
     assert found.answers == (("spring",),)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imitator", "mass", "gain", "told"),
     [

@@ -109,7 +109,6 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
     assert mapped.replayed == pytest.approx(mapped.position_error[1], rel=0.02)
 
 
-@pytest.mark.slow
 def test_the_shape_is_recovered_and_the_physics_keeps_its_values(
     mapped: Addition,
 ) -> None:
@@ -137,7 +136,6 @@ def test_a_refit_smooths_as_was_chosen(
     assert again.error == pytest.approx(first.error, rel=0.05)
 
 
-@pytest.mark.slow
 @DESCRIPTIONS
 @pytest.mark.parametrize("seed", [11, pytest.param(21, marks=SLOW)])
 def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
@@ -331,7 +329,6 @@ def test_parts_that_were_not_chosen_are_zero_and_held(about):
     assert "found nothing to depend on" in nonparametric_in_words(empty)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("held", [("held",), ()])
 def test_curves_count_as_many_parameters_as_they_are_worth(held):
     dataset = built_machine(built_dataset("run", held=held), PLAIN, lambda x, turn: 40.0 * x**2)

@@ -212,7 +212,6 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
 
 
-@pytest.mark.slow
 def test_a_late_test_log_contradicts_nothing_and_is_told() -> None:
     """Late by a quarter of a pitch at speed, of the cogging that it would refute."""
     logs = runs(having(SLIDE, "cogging", p=0.02, a1=0.8))
@@ -227,7 +226,6 @@ def test_a_late_test_log_contradicts_nothing_and_is_told() -> None:
     assert found.dataset.odd.otherwise.there == pytest.approx(30 / RATE, rel=0.2)
 
 
-@pytest.mark.slow
 def test_less_friction_in_one_log_is_told_below_what_the_model_lacks() -> None:
     machine = having(SLIDE, "cogging", p=0.02, a1=0.3)
     warm = having(machine, "coulomb_viscous", Fc=0.6 * SLIDE["coulomb_viscous"].values["Fc"])

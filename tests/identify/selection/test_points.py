@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 # 1. A control that is the candidate itself.
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.01, 0.3])
 def test_an_offset_far_above_the_noise_is_named(size: float) -> None:
     """A constant shifted in time is the constant: as its own control it was never proved."""
@@ -78,7 +77,6 @@ def in_units(name: str, force: float, place: float) -> AxisDiagnosis:
     return diagnose_axis(*begun(base, {"one": one, "two": two}, {"held": held}), RIVALS)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("force", "place"), UNITS)
 @pytest.mark.parametrize("name", IN_UNITS)
 def test_the_answer_is_the_same_in_other_units(name: str, force: float, place: float) -> None:
@@ -109,7 +107,6 @@ def test_a_lag_at_its_upper_bound_is_refused(tau: float, told: str | None) -> No
     assert try_effect(fit, dataset, CATALOGUE["actuator_lag"]).refused == told
 
 
-@pytest.mark.slow
 def test_a_bound_that_the_logs_do_not_prefer_is_held_against_no_effect() -> None:
     """Of a mode that the motion does not reach, its mass over its stiffness alone is told."""
     true = having(SLIDE, "flexible_mode", load=0.3, frequency=100.0, damping=0.3)
@@ -135,7 +132,6 @@ def with_hum(log: Log, seed: int, times: float = 1.0) -> Log:
     return log_of(RATE, x.position, x.force + times * hum(seed))
 
 
-@pytest.mark.slow
 def test_a_ripple_of_narrow_peaks_resembles_the_law_that_a_curve_replaces() -> None:
     """What was added is not there any more when a free curve has taken its place."""
 
@@ -148,7 +144,6 @@ def test_a_ripple_of_narrow_peaks_resembles_the_law_that_a_curve_replaces() -> N
     assert "cogging" not in found.final.axis.names
 
 
-@pytest.mark.slow
 def test_stops_are_found_where_the_logs_end_whatever_the_travel_of_the_model() -> None:
     true = having(SLIDE, "end_stop", low=-0.054, high=0.054, stiffness=400.0)
     wide = replace(SLIDE, hardware=replace(HARDWARE, travel=(-0.09, 0.108)))
@@ -158,7 +153,6 @@ def test_stops_are_found_where_the_logs_end_whatever_the_travel_of_the_model() -
     assert found.final.axis["end_stop"].values["low"] == pytest.approx(-0.054, abs=5e-4)
 
 
-@pytest.mark.slow
 def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     """That the noise floor rises is no change of the model: each form had unpacked its findings."""
     one, two, held = (with_hum(logged(SLIDE, Ride(seed)), seed) for seed in (1, 2, 3))
@@ -171,7 +165,6 @@ def test_noise_of_the_drive_with_nothing_missing_is_told_in_all_forms() -> None:
     assert json_of(found)["axes"]["x"]["verdict"] == "nothing_missing"
 
 
-@pytest.mark.slow
 def test_rounding_is_named_beside_noise_that_no_sensor_makes() -> None:
     def read(log: Log, seed: int) -> Log:
         x = with_hum(log, seed, 1.4).axes["x"]
@@ -343,7 +336,6 @@ def test_a_lone_bump_is_no_cogging() -> None:
     assert found.base.ratio > 5.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("pole", [0.98, *(pytest.param(p, marks=SLOW) for p in (0.9, 0.995))])
 def test_of_coloured_noise_alone_nothing_is_missing_over_a_floor_of_its_size(pole: float) -> None:
     size, rng = 0.010, np.random.default_rng(1)  # N

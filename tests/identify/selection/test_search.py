@@ -75,7 +75,6 @@ def test_selection_logs_may_ask_for_the_larger_of_tied_changes(fitted, held, nam
     assert simplest((many, few)).change.name == named
 
 
-@pytest.mark.slow
 def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
     """An offset takes most of an asymmetric friction, until wear leaves more of it to see."""
     found = searched(
@@ -89,7 +88,6 @@ def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
     assert found.final.at_floor
 
 
-@pytest.mark.slow
 def test_two_that_distort_each_other_are_found_together() -> None:
     """Neither is accepted alone: each leaves what the other makes of the motion."""
     catalogue = (*BOTH, "quadratic_drag", "spring")
@@ -103,7 +101,6 @@ def test_two_that_distort_each_other_are_found_together() -> None:
     assert found.final.at_floor
 
 
-@pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
     reason="a free curve of the friction (part 1.00, t 25, control 0.21) is accepted before two "
@@ -116,7 +113,6 @@ def test_two_laws_are_asked_together_before_a_free_curve_takes_both() -> None:
     assert set(found.named) == set(both)
 
 
-@pytest.mark.slow
 def test_a_law_that_became_another_is_tried_from_its_other_starts() -> None:
     """One period near the reach follows two short ones best, and is no period any more."""
 
@@ -144,7 +140,6 @@ def with_drag(power: float, size: float) -> AxisDiagnosis:
     return asked(SLIDE, SLIDE, few("quadratic_drag", "wear", "cogging"), drag, RIDE)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.02, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_a_drag_of_another_power_is_told_as_such_even_where_the_law_reaches_the_noise(size):
     (finding,) = with_drag(3.0, size).findings
@@ -155,7 +150,6 @@ def test_a_drag_of_another_power_is_told_as_such_even_where_the_law_reaches_the_
     assert (true.effect, true.kind, true.bend) == ("quadratic_drag", FindingKind.MISSING, None)
 
 
-@pytest.mark.slow
 def test_a_hard_current_limit_is_named_with_all_of_the_force_above_it_lost():
     stage = PROTON
     stage = MachineModel(stage.name, {"x": stage.axes["x"]}, stage.sample_rate)
@@ -172,7 +166,6 @@ def test_a_hard_current_limit_is_named_with_all_of_the_force_above_it_lost():
     assert finding.parameters["limit"] == pytest.approx(0.8 * most, rel=0.02)
 
 
-@pytest.mark.slow
 def test_an_effect_stands_without_a_strength_that_ended_at_its_bound():
     """Viscous friction that differs by more than the law allows, beside dry friction that does."""
 
@@ -259,7 +252,6 @@ def test_a_law_of_any_machine_is_found_with_its_values(name: str) -> None:
         assert found.fit.axis[name].values[key] == pytest.approx(value, rel=0.05, abs=0.02)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -28,7 +28,6 @@ def test_the_simpler_of_two_leads_unless_it_was_doubted() -> None:
     assert [s.change.name for s in with_ties(doubted).steps] == ["lugre"]
 
 
-@pytest.mark.slow
 def test_another_shape_goes_with_the_friction_that_it_was_of() -> None:
     """A friction that takes the place of a force takes that of the friction beside it as well."""
     machine = having(
@@ -64,7 +63,6 @@ def test_what_came_near_is_compared_again_beside_the_other_of_a_pair() -> None:
     assert found.findings[0].parameters["tau"] == pytest.approx(plant.lag, rel=0.06)
 
 
-@pytest.mark.slow
 def test_a_late_law_is_found_beside_the_friction_that_hid_it() -> None:
     """The force without the friction tells how late it is, while the bristle is missing still."""
     drive = DRIVES["cart"]
