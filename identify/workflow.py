@@ -64,7 +64,6 @@ from twin.logs import GivenLogs, Log, logs_by_name
 from twin.model.file import as_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, parallel, silent, spread, within
-from twin.threads import trim_memory
 
 Model = MachineModel | str | Path
 READING = "reading and preparing the logs"
@@ -154,7 +153,6 @@ def fit_as_given(
         model = model.with_intervals(axis, intervals_to_keep(done, intervals[axis]))
         for used in (done, dataset):
             used.forget()  # the next axis needs the memory
-    trim_memory()
     return FitResult(model, found, fits, intervals, held, tested, given, refits)
 
 
@@ -298,8 +296,6 @@ def diagnose(
     bodies = away.bodies_beside(ends, {axis: d.dataset for axis, d in axes.items()})
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
-    for final in ends.values():
-        final.forget()  # it is the last that asked for the matrices of all logs
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}

@@ -33,7 +33,6 @@ from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import spread
 from twin.telling import tell
-from twin.threads import trim_memory
 
 LONGER = "give a log in which it moves for longer at a time, or shorter test functions (s)"
 
@@ -52,15 +51,7 @@ def datasets(
     axis of the model moves in any training log, where a log has no samples, where a signal is not a
     number, and where a log has two roles.
     """
-    out = _prepared(model, (logs, holdout, test or {}), test_function)
-    trim_memory()  # of the logs, which are let go of by now
-    return out
-
-
-def _prepared(
-    model: MachineModel, parts: Sequence[Mapping[str, Log]], test_function: float | None
-) -> dict[str, Dataset]:
-    """The datasets of ``datasets``; parts: the logs of each role."""
+    parts = (logs, holdout, test or {})
     given: Given = {role: dict(part) for role, part in zip(Role, parts, strict=True)}  # read once
     training = given[Role.TRAINING].values()
     require_test_function(test_function, max((len(g) * g.period for g in training), default=0.0))

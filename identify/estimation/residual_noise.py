@@ -35,7 +35,6 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array
-from twin.threads import trim_memory
 
 HATS = 16  # knots of a curve over a coordinate; finer ones would learn the noise
 MOVED = ("velocity", "acceleration", "direction")
@@ -161,7 +160,6 @@ def is_noise(fit: Fit, dataset: Dataset) -> bool:
     # 0.5 of the force, RMS: a larger rest is of another machine
     if len(logs) == 1 or fit.error > 0.5 * rms(command):
         return False
-    trim_memory()  # matrices of all logs follow
     rest = Remainder.of(fit, logs)
     kurtosis = _kurtosis(rest.force)
     # 24/n is the variance of the kurtosis of n normal samples

@@ -35,7 +35,6 @@ from identify.selection.trying import parameters
 from twin.curve import Coordinate
 from twin.knee import Imitated
 from twin.model.machine import AxisModel
-from twin.threads import trim_memory
 
 
 @dataclass(frozen=True)
@@ -247,7 +246,6 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     """The finding of the steps that are about one law; noise: N, of the test logs with all."""
     dataset, final, less = found.dataset, found.final, _without(steps, found)
     less.tell()  # not both fits at once, whose matrices are of whole logs
-    trim_memory()
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
     is_noise = steps[0].tried.candidate.is_noise  # which lowers no error

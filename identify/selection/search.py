@@ -10,7 +10,7 @@ together, and each beside the other, are needed together.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -120,27 +120,20 @@ def resumed(found: Found, catalogue: Catalogue, progress: Progress = silent) -> 
     dataset, base = found.dataset, found.base.fit
     if dataset.part is dataset:
         return _search(found, catalogue, progress)
-    base.forget()  # of all of the logs; it is asked for them when the search has ended
     found = _search(_on_part(found), catalogue, progress)
     progress("answer fitted to the whole logs", 0, 1)
-    _forget(_fits_of(found))
+    _let_go(found)
     whole = _on_whole(found, base, dataset)
-    trim_memory()
     if found.final.fit.ratio * RULE.at_floor > whole.final.fit.ratio or whole.final.at_floor:
         return whole
     return _search(whole, catalogue, progress)
 
 
-def _fits_of(found: Found) -> list[Fit]:
-    """All fits of a search, some of them several times."""
+def _let_go(found: Found) -> None:
+    """Let go of the matrices of all fits of a search, before those of whole logs are made."""
     tried = [*found.last, *found.exchanged, *(t for s in found.passed for t in (s.tried, *s.tied))]
     fits = [found.base.fit, found.final.fit, *(t.judged.fit for t in tried)]
-    return [*fits, *(c.fit for c in found.ranking)]
-
-
-def _forget(fits: Iterable[Fit]) -> None:
-    """Let go of the matrices of fits that nobody needs beside those of others."""
-    for fit in fits:
+    for fit in (*fits, *(c.fit for c in found.ranking)):
         fit.forget()
     for known in (ControlTest.beside, basis_beside):
         known.cache_clear()
@@ -197,7 +190,6 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
             break
         exchanged = []
         passed += new
-        _forget(t.judged.fit for t in last if all(t is not s.tried for s in new))
         step("all values refitted", 0, 1)
         judged, steps = _needed(new[-1].tried.judged, (*steps, *new), first)
         judged = _in_simplest_values(judged, steps)
@@ -485,7 +477,6 @@ def _needed(
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
             needed = _is_needed(step.change, without, judged)
-            without.fit.forget()
             without = fitted_anew(without)
             if needed and _is_needed(step.change, without, judged):
                 continue

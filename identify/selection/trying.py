@@ -40,7 +40,6 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.model.machine import AxisModel
 from twin.parallel import Progress, silent, spread, within
-from twin.threads import trim_memory
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
@@ -114,7 +113,6 @@ def tried_beside(
         tried += _refitted(judged, best, looks * len(curves), progress, trial.least, tried)
     judged, tried = _at_its_best(judged, tried)
     tried = _with_alike_evidence(tried)
-    trim_memory()
     rounded = knows_rounding(judged.fit.axis, [log.motion for log in judged.dataset.training])
     noise = [as_noise(judged, e) for e in effects if e.is_noise and not rounded]
     ranked = {t.candidate.effect.name: t.candidate for t in tried if isinstance(t.change, Added)}
