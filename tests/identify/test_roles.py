@@ -11,7 +11,10 @@ import pytest
 from built_fits import built, built_fit
 from constructed import CATALOGUE, effect
 from machines import one_axis
+from planted_logs import RATE, SLIDE, Ride, having
+from planted_logs import logged as written
 
+import identify
 from identify import workflow
 from identify.dataset.dataset import Role
 from identify.dataset.preparation import datasets
@@ -26,6 +29,7 @@ from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.logs import Log
 from twin.model.file import load_model
+from twin.model.machine import MachineModel
 from twin.simulation.simulate import simulate
 from twin.simulation.simulators import ReducedSimulator
 
@@ -182,3 +186,42 @@ def test_the_model_of_a_diagnosis_has_what_was_found_as_it_was_fitted(case):
     labels = {e.label for e in case.diagnosis.summaries["x"].after if e.low is not None}
     assert made_of_it.intervals["x"].ends.keys() == labels
     assert case.concluding(case.quiet).model is case.diagnosis.fitted
+
+
+@pytest.mark.parametrize(
+    ("errors", "role"),
+    [
+        ({}, Role.TRAINING),
+        ({"holdout_error_after": 0.9}, Role.SELECTION),
+        ({"holdout_error_after": 0.9, "test_error_after": 0.8}, Role.TEST),
+    ],
+)
+def test_what_was_added_is_reported_on_the_logs_that_decided_least(errors, role) -> None:
+    step = replace(made.STEPS[2], **errors)
+    assert replace(made.addition(), step=step).reported_on is role
+
+
+def test_a_law_is_given_the_shape_that_the_logs_show() -> None:
+    """A drag that saturates, of a model whose drag is quadratic."""
+
+    def drag(_: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        return -4.0 * np.sign(speed) * np.sin(np.minimum(12.0 * np.abs(speed), 3.0))
+
+    model = MachineModel("m", {"x": having(SLIDE, "quadratic_drag", c=3.0)}, RATE)
+    logs = {f"run{i}": written(SLIDE, Ride(30 + i), beside=drag) for i in range(3)}
+    held = {"run2": logs.pop("run2")}
+    added = identify.add_shape("quadratic_drag", model, logs, held, axis="x")
+    assert (added.reshaped, added.kept) == ("quadratic_drag", True)
+    assert added.step.holdout_error_after < 0.01 * added.step.holdout_error_before
+    assert "gave quadratic_drag of axis x the shape that the logs show" in str(added)
+    with pytest.raises(InputError, match="has no effect 'cogging'"):
+        identify.add_shape("cogging", model, logs, held)
+
+
+@pytest.mark.parametrize(("name", "another"), [("cogging", "cogging_2"), ("quadratic_drag", "")])
+def test_an_effect_that_is_there_is_not_added_again(name: str, another: str) -> None:
+    model = MachineModel("m", {"x": having(SLIDE, name)}, RATE)
+    with pytest.raises(InputError, match=f"has the effect '{name}' already") as told:
+        identify.add(name, model, {"run": written(SLIDE, Ride(30))})
+    assert another in str(told.value)
+    assert ("is another" in str(told.value)) == bool(another)

@@ -249,7 +249,9 @@ def test_the_command_prints_and_writes(log: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(json.loads(message.data)["real"], real, rtol=1e-8)
     assert "end the name in .csv or .mcap" in refusal("frf", log, "-o", "r.txt", folder=tmp_path)
     assert "end the name in .png" in refusal("frf", log, "--plot", "b.xyz", folder=tmp_path)
-    plant = json.loads(answer.stdout)["axes"]["x"]["measured"]["plant"]
+    measured = json.loads(answer.stdout)["axes"]["x"]["measured"]
+    assert ("gain margin" in done.stdout) == (measured["loop"]["gain_margin"] is not None)
+    plant = measured["plant"]
     assert plant["delay"]["value"] == pytest.approx(1.3e-3, abs=2e-5)
 
 

@@ -40,6 +40,7 @@ from identify.results.fleet import (
     Off,
     Scope,
 )
+from identify.results.grown import AllAdded, Removal
 from identify.selection.diagnosis import Verdict
 from identify.selection.findings import FindingKind
 from identify.validation.agreement import Agreement
@@ -149,6 +150,10 @@ LAWS = [
 ]
 LATE = LogFinding(Severity.WARNING, Fault.LAG, "y", "the what", Place(1.5, 2.0, 3), "the remedy")
 
+ADDED = (
+    replace(made.STEPS[0], action="body", effect="forearm"), *made.STEPS[:2], made.STEPS[2],
+)  # fmt: skip
+REMOVED = replace(made.STEPS[0], action="remove")
 DAYS = [date(2026, 3, day) for day in range(1, 7)]
 ALARM = Alarm(
     "m1", "x", "stage", "lugre.Fc", "N", DAYS[5], DAYS[3], DAYS[2], DAYS[4], before=1.3, after=1.7,
@@ -235,6 +240,13 @@ TEXTS: dict[str, Callable[[], object]] = {
             findings=(replace(COGGING, tied=("lugre",)), replace(LUGRE, tied=("cogging",)))
         )
     ),
+    "all that was found added": lambda: AllAdded(made.MODEL, made.fit_result(), ADDED, True),
+    "all that was found added, which nothing proves": lambda: AllAdded(
+        made.MODEL, made.fit_result(), ADDED[1:], False
+    ),
+    "removal": lambda: Removal(made.MODEL, REMOVED, needed=False),
+    "removal of what is needed": lambda: Removal(made.MODEL, REMOVED, needed=True),
+    "feedforward": made.feedforward,
     "fleet: what became of logs": lambda: words.ingested_in_words(
         Ingested(Path("logs"), Path("store"), 12, 7, 3, 2, 0)
     ),

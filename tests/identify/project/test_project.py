@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from cli_runs import twin
 
-from identify.project.entries import AnswerEntry, ExportEntry, Project
+from identify.project import history
+from identify.project.entries import AnswerEntry, ExportEntry, ModelEntry, Project
 from identify.project.folder import Folder
 
 T = np.arange(4000) / 1000.0
@@ -187,3 +188,28 @@ def test_a_second_command_waits_and_says_for_whom(tmp_path):
             assert second.is_alive()
     second.join(timeout=5.0)
     assert told == ["twin diagnose"]
+
+
+def test_a_command_that_failed_does_not_end_the_history(tmp_path):
+    folder = Folder(tmp_path)
+    folder.begin()
+    history.note(folder, ["check", "a.mcap"], ends_well=False)
+    history.note(folder, ["fit"])
+    assert (tmp_path / history.HISTORY).read_text().splitlines()[-2:] == [
+        "twin check a.mcap || true", "twin fit",
+    ]  # fmt: skip
+    assert history.commands(folder) == ["twin check a.mcap", "twin fit"]
+
+
+def test_the_last_answer_of_a_kind_about_the_present_model():
+    models = [ModelEntry(file="models/1.toml"), ModelEntry(file="models/2.toml")]
+    asked = (("diagnose", 2), ("diagnose", 1), ("compare", 2), ("diagnose", 2), ("compare", 2))
+    answers = [
+        AnswerEntry(
+            command=f"twin {kind} models/{n}.toml", file=f"{i}.json", model=f"models/{n}.toml"
+        )
+        for i, (kind, n) in enumerate(asked)
+    ]
+    found = Project(models=models, answers=answers)
+    assert found.answer("diagnose") is answers[3]
+    assert found.answer("plan") is None

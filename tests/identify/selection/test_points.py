@@ -245,8 +245,10 @@ def test_a_curve_of_friction_is_offered_where_both_directions_are_well_visited(
     assert [s.effect for s in shapes] == ["coulomb_viscous"] * offered
     for shape in shapes:  # drawn where the logs have been, and nowhere else
         places = np.concatenate([log.motion.position for log in dataset.training])
-        drawn = found_shape(shape, fit, dataset).coordinate
-        assert (drawn[0], drawn[-1]) == (places.min(), places.max())
+        drawn = found_shape(shape, fit, dataset)
+        assert (drawn.coordinate[0], drawn.coordinate[-1]) == (places.min(), places.max())
+        ahead, behind = (curve.found for curve in drawn.curves.values())
+        np.testing.assert_allclose(ahead, -behind, rtol=0.1)  # as friction does, it turns
 
 
 PITCHES = (0.0113, 0.0171, 0.0079, 0.0253, 0.0061)  # m

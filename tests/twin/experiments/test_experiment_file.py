@@ -152,6 +152,7 @@ def test_structured_text_has_a_point_of_the_table_for_each_cycle(tmp_path):
     arrays = re.findall(r"(\w+) : ARRAY\[0\.\.(\d+)\] OF \w+ := \[ \(\* (.+) \*\)([^\]]+)\];", text)
     found = {f"{name} [{unit}]": np.array(rows.split(","), float) for name, _, unit, rows in arrays}
     last = int(re.search(r"Last : DINT := (\d+);", text)[1])
+    assert "Setpoints for a PLC task of 1 ms." in text
     assert {int(end) for _, end, _, _ in arrays} == {last} == {len(v) - 1 for v in found.values()}
     at = np.append(np.arange(last) * 1e-3, table["time [s]"][-1])
     for axis in "xy":

@@ -185,7 +185,7 @@ def test_what_a_file_lacks_is_not_told_to_be_kept(left_out: str) -> None:
 
 @pytest.mark.parametrize(
     "to",
-    ["c", *(pytest.param(n, marks=pytest.mark.slow) for n in ("csv", "twincat", "ros2_control"))],
+    ["c", "csv", "twincat", "ros2_control"],
 )
 def test_an_export_is_told_to_be_that_of_the_model_or_of_one_before(tmp_path, to) -> None:
     model = MachineModel("drive", {"x": AxisModel(2.0, HARDWARE, PLAIN)}, 1000.0)

@@ -21,6 +21,7 @@ from twin.simulation.loop import (
     VELOCITY_COLUMN,
     Controller,
 )
+from twin.simulation.simulate import simulate
 from twin.simulation.simulators import FineSimulator, MujocoSimulator, ReducedSimulator, run
 
 H = 5e-4  # s
@@ -189,3 +190,12 @@ def test_noise_of_the_encoder_is_that_of_each_axis_and_reported_progress_ends() 
     np.testing.assert_allclose(error.std(axis=0), [3e-6, 7e-6], rtol=0.06)
     assert abs(np.corrcoef(error.T)[0, 1]) < 0.06
     assert told == [(4000, 4000)]
+
+
+@pytest.mark.parametrize(("step", "noise"), [(0.0, 3e-6), (2e-6, 3e-6), (2e-6, 0.0)])
+def test_a_reading_has_the_noise_and_the_rounding_of_its_encoder(step: float, noise: float) -> None:
+    hardware = Hardware(travel=(-0.1, 0.1), encoder_resolution=step, encoder_noise=noise)
+    model = MachineModel("m", {"x": AxisModel(2.0, hardware)}, 1000.0)
+    log = simulate(model, "tracking", seed=3, duration=4.0, simulator=ReducedSimulator)
+    off = log.axes["x"].position - log.truth["x"]["position"]
+    assert np.std(off) == pytest.approx(math.hypot(noise, step / math.sqrt(12.0)), rel=0.1)
