@@ -89,7 +89,7 @@ def row_of(case: str, expected: Expected, found: AxisDiagnosis, seconds: float) 
         "mark": WRONG if WRONG in marks else beside,
         "named": best != SILENT,
         "findings": findings,
-        "small": list(found.small),
+        "small": list(found.also_seen),
         "contradicted": [f.effect for f in found.contradicted],
         "doubted": dict(found.doubted),
         "unit": found.dataset.units.force,

@@ -55,7 +55,7 @@ def alone(here: AxisDiagnosis, there: AxisDiagnosis) -> set[str]:
 def row(case: str, found: Sequence[AxisDiagnosis]) -> Row:
     """The answers of one machine, of which another log chose each."""
     answers = [families(answer.findings) for answer in found]
-    own = [{law.effect for law in answer.by_roles} for answer in found]
+    own = [{law.effect for law in answer.depends_on_roles} for answer in found]
     pairs = [*combinations(range(len(found)), 2)]
     lone = {(i, j): alone(found[i], found[j]) for i, j in permutations(range(len(found)), 2)}
     return {

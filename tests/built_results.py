@@ -90,7 +90,7 @@ TRIALS = (
 def plan_of(*between: str, **changes: object) -> Plan:
     plan = Plan(
         axis="x", between=between, ranking=TRIALS, gap=Gap("speed", "m/s", 0.0137, 0.0591, 0.0117),
-        favoured=None, excited_by={between[0]: "slow passes"}, supposed=False,
+        favoured_by_the_logs=None, excited_by={between[0]: "slow passes"}, supposed=False,
     )  # fmt: skip
     return replace(plan, **changes)
 
@@ -187,7 +187,7 @@ def comparison_of(axis: str = "x", o: float = 0.0) -> AxisComparison:
         force_error={"run 1": 0.0517 + o, "run 2": 0.0731 + o},
         floor=0.0113 + o,
         position_error={"run 1": 3.17e-6 + o, "run 2": 4.29e-6 + o},
-        position_floor={"run 1": 2.13e-7 + o, "run 2": 2.57e-7 + o},
+        position_drift_of_noise={"run 1": 2.13e-7 + o, "run 2": 2.57e-7 + o},
         residual=residual * (0.0647 + o) / np.sqrt(np.mean(residual**2)),
         logs=DATASET.training,
         coordinates={
@@ -309,7 +309,7 @@ def addition(kept: bool = True) -> Addition:
         (3.71e-6, 1.93e-6),
         1.97e-6,
         (MOVED,),
-        position_log="run 1",
+        position_error_on="run 1",
         notes=("mass moved", "the errors told flatter it"),
     )
 

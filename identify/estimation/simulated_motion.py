@@ -47,8 +47,8 @@ OF_OTHER_AXIS = ("X_OTHER", "V_OTHER", "A_OTHER")
 class MotionFit:
     """An axis fitted to the motion of logs.
 
-    begun: before. beginnings: of each log. starts: RMS errors (m) at which the searches from the
-    several starts stood when the best was chosen; the first is that of the axis as given.
+    begun: before. beginnings: of each log. errors_of_starts: RMS (m), at which the searches from
+    the several starts stood when the best was chosen; the first is that of the axis as given.
     """
 
     axis: AxisModel
@@ -56,7 +56,7 @@ class MotionFit:
     logs: Sequence[PreparedLog]
     beginnings: Sequence[Beginning]
     outcome: Outcome
-    starts: Sequence[float]
+    errors_of_starts: Sequence[float]
 
     def __repr__(self) -> str:
         return f"<MotionFit: {self.error:.4g} m over {len(self.logs)} logs>"
@@ -107,7 +107,7 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
         logs=logs,
         beginnings=problem.beginnings_at(found.x),
         outcome=Outcome.CONVERGED if found.converged else Outcome.NOT_CONVERGED,
-        starts=[problem.error(s.x) for s in tried],
+        errors_of_starts=[problem.error(s.x) for s in tried],
     )
 
 

@@ -66,7 +66,7 @@ class Plan(Printed):
     between: tuple[str, ...]
     ranking: tuple[SimulatedExperiment, ...]
     gap: Gap
-    favoured: str | None
+    favoured_by_the_logs: str | None
     excited_by: Mapping[str, str]
     supposed: bool
     not_run: tuple[NotRun, ...] = ()
@@ -181,7 +181,7 @@ def _planned(
         between=names,
         ranking=ranking,
         gap=gap(ranking[0].motion, ranking[0].where, logs),
-        favoured=favourite if evidence > RULE.least_bic else None,
+        favoured_by_the_logs=favourite if evidence > RULE.least_bic else None,
         excited_by={n: effects[n].excited_by for n in names if n in effects},
         supposed=supposed,
         not_run=(*too_long, *not_run, *(t.not_run for t in ranking if t.not_run)),

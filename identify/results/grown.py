@@ -25,11 +25,11 @@ class Addition(Printed):
     """A model with one added effect.
 
     step: errors before and after. kept: whether training and selection logs prove the effect.
-    position_error: free-running RMS error before and after; replayed: the same after, stepped by
-    MuJoCo. Both in the units of the axis, None where the motion is imposed. position_log: the log
-    that they are of. moved: parameters that the effect changed. set_aside: nonparametric effects
-    that were removed from the model before. notes: what a reader should know beside the errors, one
-    sentence each.
+    position_error: free-running RMS error before and after; position_error_in_mujoco: the same
+    after, stepped by MuJoCo. Both in the units of the axis, None where the motion is imposed.
+    position_error_on: the log that they are of. moved: parameters that the effect changed.
+    set_aside: nonparametric effects that were removed from the model before. notes: what a reader
+    should know beside the errors, one sentence each.
     """
 
     model: MachineModel
@@ -37,10 +37,10 @@ class Addition(Printed):
     candidate: Candidate
     kept: bool
     position_error: tuple[float, float] | None
-    replayed: float | None
+    position_error_in_mujoco: float | None
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
-    position_log: str | None = None
+    position_error_on: str | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -151,10 +151,10 @@ def addition(
         candidate=best,
         kept=best.supported,
         position_error=moving,
-        replayed=replayed,
+        position_error_in_mujoco=replayed,
         moved=moved_parameters(base, best.fit),
         set_aside=tuple(n for n in given.axes[name].names if n not in left),
-        position_log=None if moving is None else next(iter(by_log(prepared))),
+        position_error_on=None if moving is None else next(iter(by_log(prepared))),
     )
 
 

@@ -43,9 +43,9 @@ class AxisDiagnosis:
     findings: what each of these explains. contradicted: findings that the test logs refuse, which
     the final fit is without. doubted: by name of each law that was taken out at the end, why, in
     words. unexplained: what the residual depends on, where it is
-    not noise. small: effects that the data show and that take too little to matter. repeat: a force
-    that repeats along the track in each log, but at other places in each. by_roles: laws that are
-    proved or not by which log chooses.
+    not noise. also_seen: effects that the data show and that take too little to matter. repeat: a
+    force that repeats along the track in each log, but at other places in each. depends_on_roles:
+    laws that are proved or not by which log chooses.
     """
 
     dataset: Dataset
@@ -58,9 +58,9 @@ class AxisDiagnosis:
     contradicted: tuple[Finding, ...] = ()
     doubted: Mapping[str, str] = field(default_factory=dict)
     unexplained: Dependence | None = None
-    small: tuple[str, ...] = ()
+    also_seen: tuple[str, ...] = ()
     repeat: Repeat | None = None
-    by_roles: tuple[RoleDependent, ...] = ()
+    depends_on_roles: tuple[RoleDependent, ...] = ()
 
     def __repr__(self) -> str:
         answer = f"{self.verdict.name.lower()} {list(self.answers)}"
@@ -154,9 +154,9 @@ def diagnose_axis(
         contradicted=ended.contradicted,
         doubted=ended.doubted,
         unexplained=None if quiet else find_dependence(final.fit, found.dataset),
-        small=_small(found),
+        also_seen=_small(found),
         repeat=None if final.fit.at_floor else not_general(final.fit, found.dataset),
-        by_roles=by_roles,
+        depends_on_roles=by_roles,
     )
 
 

@@ -52,16 +52,17 @@ class AxisComparison:
     """One axis over some logs.
 
     force_error: N RMS of the force residual, by log. floor: N. position_error: m RMS of the free
-    run, by log; position_floor: the same from measurement noise alone. residual (n,) N, coordinates
-    name -> (n,). kept: which test functions of the logs in a row (all,) tell something, n of them.
-    curves: force (m,) N of each nonparametric effect along the motion of the logs, by its name.
+    run, by log; position_drift_of_noise: the same from measurement noise alone. residual (n,) N,
+    coordinates name -> (n,). kept: which test functions of the logs in a row (all,) tell something,
+    n of them. curves: force (m,) N of each nonparametric effect along the motion of the logs, by
+    its name.
     """
 
     axis: str
     force_error: Mapping[str, float]
     floor: float
     position_error: Mapping[str, float]
-    position_floor: Mapping[str, float]
+    position_drift_of_noise: Mapping[str, float]
     residual: Array
     logs: Sequence[PreparedLog]
     coordinates: Mapping[str, Array]
@@ -103,7 +104,7 @@ def compare_axis(
     model: MachineModel,
     dataset: Dataset,
     position_error: Mapping[str, float],
-    position_floor: Mapping[str, float],
+    position_drift_of_noise: Mapping[str, float],
     floor: float | None = None,
 ) -> AxisComparison:
     """Force errors of one axis over the dataset's training logs, with maps of where they are.
@@ -124,7 +125,7 @@ def compare_axis(
         force_error={log.motion.name: rms(left[own]) for log, left, own in by_log},
         floor=floor,
         position_error=position_error,
-        position_floor=position_floor,
+        position_drift_of_noise=position_drift_of_noise,
         residual=force,
         logs=logs,
         coordinates=where,

@@ -69,7 +69,8 @@ class ResidualTests:
     """Residual tests of one axis.
 
     samples: test functions that do not overlap. floor: N. edges (b + 1,) N and density (b,) 1/N of
-    the histogram. within: part of the samples within 1.645 noise floors, 0.9 for pure noise.
+    the histogram. share_within_90: part of the samples within 1.645 noise floors, 0.9 for pure
+    noise.
     """
 
     loop: Feedback
@@ -77,11 +78,11 @@ class ResidualTests:
     floor: float
     edges: Array
     density: Array
-    within: float
+    share_within_90: float
     correlations: tuple[Correlation, ...]
 
     @property
-    def passes(self) -> bool:
+    def passed(self) -> bool:
         """Whether the residual is white and uncorrelated with command and speed."""
         return all(c.passed for c in self.correlations)
 
@@ -125,7 +126,7 @@ def residual_tests(
         floor=floor,
         edges=edges,
         density=count / (len(left) * np.diff(edges)),
-        within=float(np.mean(np.abs(left) < NORMAL.inv_cdf(0.5 + WITHIN / 2.0) * floor)),
+        share_within_90=float(np.mean(np.abs(left) < NORMAL.inv_cdf(0.5 + WITHIN / 2.0) * floor)),
         correlations=tuple(
             correlation(name, series["residual"], rows, spacing, loop)
             for name, rows in series.items()

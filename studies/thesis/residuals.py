@@ -55,7 +55,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
         ],
         "test_error_before": before[0], "test_error_after": after[0],
         "noise_floor": found.final.floor, "unit": "N",
-        "white": {name: one.passes for name, one in tests.items()},
+        "white": {name: one.passed for name, one in tests.items()},
         "outside_90_bounds": {
             name: {c.signal: c.share_outside for c in one.correlations}
             for name, one in tests.items()

@@ -334,13 +334,13 @@ def test_a_command_tells_and_writes_what_its_call_gives(slide, name, monkeypatch
     source = () if name != "diagnose" else (Source(model="m.toml", options=TYPED),)
     assert text.startswith(to_text(blocks_of(found, *source)))
     if name == "add":
-        assert (found.position_log is None) == (found.position_error is None)
+        assert (found.position_error_on is None) == (found.position_error is None)
     if name in ("fit", "add"):
         again = load_model(slide / out, load_catalogue())
         assert again.axes["x"].names == found.model.axes["x"].names
         assert again.axes["x"].mass == pytest.approx(found.model.axes["x"].mass)
     if name == "plan":
-        assert (found.favoured, found.supposed) == ("quadratic_drag", False)
+        assert (found.favoured_by_the_logs, found.supposed) == ("quadratic_drag", False)
         assert found.gap.share is not None
         assert load_experiment(slide / out) == found.chosen.experiment
         assert f"twin simulate {out}" in text

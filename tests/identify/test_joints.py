@@ -148,7 +148,7 @@ def test_the_free_run_goes_as_the_arm_did_and_without_its_friction_astray(folder
     for joint in JOINTS:
         (error,), (noise,) = (
             whole[joint].position_error.values(),
-            whole[joint].position_floor.values(),
+            whole[joint].position_drift_of_noise.values(),
         )
         assert error < 3.0 * noise < 2e-3
     assert max(lacking["shoulder"].position_error.values()) > 0.02

@@ -70,18 +70,20 @@ _Kept = tuple[str, Callable[[], Iterator[Log]]]
 class Recovery:
     """What was kept of a log, and one sentence for each loss (none: the log was intact).
 
-    unproved: what was kept although no checksum proves it, one sentence each. others: the stretches
-    of samples that a gap separates from the longest one, in the order of time.
+    not_proved: what was kept although no checksum proves it, one sentence each. others: the
+    stretches of samples that a gap separates from the longest one, in the order of time.
     """
 
     kept: str
     lost: tuple[str, ...]
-    unproved: tuple[str, ...] = ()
+    not_proved: tuple[str, ...] = ()
     others: tuple[Log, ...] = ()
 
     def __str__(self) -> str:
         lost = self.lost or ("nothing was lost",)
-        return "\n".join((f"kept {self.kept}", *(f"not proved: {u}" for u in self.unproved), *lost))
+        return "\n".join(
+            (f"kept {self.kept}", *(f"not proved: {u}" for u in self.not_proved), *lost)
+        )
 
 
 def recover_log(path: str | Path, *, unproved: bool = False) -> tuple[Log, Recovery]:

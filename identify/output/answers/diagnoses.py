@@ -68,10 +68,10 @@ class AdditionAnswer(Answer, ValuesEntry):
     why_not: str | None = read("candidate.refused")
     notes: list[str]
     noise_floor: Number = read("candidate.fit.floor")
-    position_error_on: str | None = read("position_log")
+    position_error_on: str | None
     position_error_before: Number
     position_error_after: Number
-    position_error_in_mujoco: Number = read("replayed")
+    position_error_in_mujoco: Number
     position_unit: str = read("units.position")
     left_out: list[str] = Field([])
 
@@ -229,8 +229,8 @@ class DiagnosisEntry(Entry):
     explained: Number
     """Part of the squared error above the noise floor that all findings together remove."""
     needed_together: list[str]
-    also_seen: list[str] = read("small")
-    depends_on_roles: list[RoleDependent] = read("by_roles")
+    also_seen: list[str]
+    depends_on_roles: list[RoleDependent]
     unexplained: Dependence | None
     remainder: RemainderEntry | None
     repeats_not_general: Repeat | None = read("repeat")

@@ -153,7 +153,7 @@ class SimulationFitEntry(Entry):
     holdout_position_error: Number
     holdout_position_error_of_force_fit: Number
     unit: str = read("axis.units.position")
-    errors_of_starts: list[Number] = read("starts")
+    errors_of_starts: list[Number]
     parameters: dict[str, SimulatedValueEntry]
     beginnings: dict[str, BeginningEntry]
 
@@ -257,7 +257,7 @@ class HistogramEntry(Entry):
     density: list[Number]
     density_unit: str
     normal_rms: Number = read("floor")
-    share_within_90: Number = read("within")
+    share_within_90: Number
 
 
 class ResidualTestsEntry(Entry):
@@ -267,7 +267,7 @@ class ResidualTestsEntry(Entry):
     loop: Annotated[Literal["open", "closed", "unknown"], LOWER] = read("loop.name")
     reason: str
     samples: int
-    passed: bool = read("passes")
+    passed: bool
     histogram: HistogramEntry
     correlations: dict[str, Correlation]
 
@@ -277,7 +277,7 @@ class ComparisonEntry(Entry):
 
     logs: dict[str, LogErrorsEntry]
     noise_floor: Number = read("floor")
-    position_drift_of_noise: dict[str, Number] = read("position_floor")
+    position_drift_of_noise: dict[str, Number]
     regions: dict[str, MisfitMap]
     worst: list[str]
     residual_tests: ResidualTestsEntry
@@ -324,5 +324,5 @@ def _log_errors(c: AxisComparison, log: str) -> LogErrorsEntry:
         force_ratio=force / c.floor,
         position_error=position,
         position_unit=c.units.position,
-        position_ratio=position and position / max(c.position_floor[log], 1e-300),
+        position_ratio=position and position / max(c.position_drift_of_noise[log], 1e-300),
     )

@@ -209,7 +209,7 @@ class RecoveryAnswer(Answer):
     log: File
     kept: str
     lost: list[str]
-    not_proved: list[str] = read("unproved")
+    not_proved: list[str]
     others: list[File]
     """The other intact parts, as files beside the log."""
 

@@ -36,7 +36,7 @@ class PlanAnswer(Answer, ExperimentEntry):
     between: list[str]
     decides: bool
     excited_by: dict[str, str]
-    favoured_by_the_logs: str | None = read("favoured")
+    favoured_by_the_logs: str | None
     refitted_on_logs: bool
     missing_motion: str
     ranking: list[ExperimentEntry]

@@ -95,7 +95,7 @@ def _candidates(found: AxisDiagnosis) -> Iterator[str]:
 @blocks_of.register
 def plan_blocks(result: Plan) -> list[Block]:
     """The question, the chosen experiment and what it is expected to show, and the next best."""
-    favoured, chosen = result.favoured, result.chosen
+    favoured, chosen = result.favoured_by_the_logs, result.chosen
     lines = (
         in_short(chosen.experiment, chosen.units),
         gap_in_words(result.gap),

@@ -203,7 +203,7 @@ def _positions(additions: Sequence[Addition]) -> TableBlock:
     for a in additions:
         alike = (b for b in additions if b.units.position == a.units.position)
         scale = DisplayUnit.of(a.units.position, [e for b in alike for e in b.position_error or ()])
-        errors = (*(a.position_error or (None, None)), a.replayed)
+        errors = (*(a.position_error or (None, None)), a.position_error_in_mujoco)
         name = f"{title_case(a.step.effect)} on {a.step.axis}"
         rows.append(Row((name, *map(scale.text, errors), "kept" if a.kept else "not supported")))
     titles = (

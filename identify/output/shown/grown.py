@@ -19,12 +19,12 @@ def addition_blocks(result: Addition) -> list[Block]:
     if result.reshaped:
         first = f"gave {step.effect} of axis {step.axis} the shape that the logs show"
     below = [*_errors_of(step, words)]
-    if result.position_error is not None and result.replayed is not None:
+    if result.position_error is not None and result.position_error_in_mujoco is not None:
         unit = result.units.position
         scale = DisplayUnit.of(unit, result.position_error)
         below.append(
             f"{words('free-running position error'):33s} {arrow(*result.position_error, unit)} "
-            f"on {result.position_log} (MuJoCo: {scale.text(result.replayed)})"
+            f"on {result.position_error_on} (MuJoCo: {scale.text(result.position_error_in_mujoco)})"
         )
     below += result.notes
     if not result.kept:

@@ -184,7 +184,7 @@ def logs(view: AxisView) -> list[Block]:
         words("Position error, free run, RMS"): (
             lambda name: position.text(axis.position_error.get(name))
         ),
-        "Expected from noise": lambda name: position.text(axis.position_floor.get(name)),
+        "Expected from noise": lambda name: position.text(axis.position_drift_of_noise.get(name)),
     }
     caption = (
         f"{of_model(view)}Noise floor of the force: {quantity(axis.floor, view.units.force)} RMS "
@@ -215,7 +215,9 @@ def _of_all_logs(view: AxisView, errors: Sequence[LogErrors]) -> TableBlock:
     columns[words(f"Position, free run{without}")] = lambda e: position.text(runs.get(e.name))
     if better:
         columns[f"Free run with {view.label}"] = lambda e: position.text(better.get(e.name))
-    columns["Expected from noise"] = lambda e: position.text(axis.position_floor.get(e.name))
+    columns["Expected from noise"] = lambda e: position.text(
+        axis.position_drift_of_noise.get(e.name)
+    )
     caption = (
         "RMS. The free run, of training logs alone, restarts from the measured motion every "
         f"{HORIZON:g} s; between restarts the position drifts with every wrong force, measurement "

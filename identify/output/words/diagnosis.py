@@ -85,9 +85,9 @@ def said_of(result: Diagnosis, axis: str) -> Said:
         left.append(dependence_in_words(found.unexplained))
         left += [words(worst_in_words(region))] if region else []
     beside = all_in_words(found)
-    if found.small:
-        beside.append(f"also seen, too small to matter: {', '.join(found.small)}")
-    beside += [role_in_words(law) for law in found.by_roles]
+    if found.also_seen:
+        beside.append(f"also seen, too small to matter: {', '.join(found.also_seen)}")
+    beside += [role_in_words(law) for law in found.depends_on_roles]
     corrected, verdict = "", words(verdict_in_words(found))
     if result.body and axis in result.body.axes:
         corrected = f"with body {result.body.body} as it was found, "

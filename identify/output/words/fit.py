@@ -103,14 +103,14 @@ def motion_fit_in_words(axis: str, fit: MotionFit, held: tuple[float, float] | N
     if held is not None:
         first, after = (quantity(error, unit) for error in held)
         said += f"; on logs that were not fitted {first}, {after} now"
-    scale = DisplayUnit.of(unit, fit.starts)
-    starts = ", ".join(number(error / scale.size) for error in fit.starts)
+    scale = DisplayUnit.of(unit, fit.errors_of_starts)
+    starts = ", ".join(number(error / scale.size) for error in fit.errors_of_starts)
     return [
         said,
         *([HELD_OUT_GREW] if held is not None and held[1] > held[0] else []),
         MOTION_OUTCOMES[fit.outcome],
-        f"position errors of the searches from {len(fit.starts)} starts when the best was chosen: "
-        f"{starts} {scale.unit}",
+        f"position errors of the searches from {len(fit.errors_of_starts)} starts when the best "
+        f"was chosen: {starts} {scale.unit}",
         "no intervals: the error of a motion that nothing restarts is one long drift, whose "
         "scatter says little; `twin fit` without --objective gives them",
     ]

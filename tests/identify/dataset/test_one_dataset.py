@@ -67,7 +67,7 @@ def test_a_force_one_sample_early_is_the_same_to_fit_compare_and_diagnose():
     assert fitted.datasets["x"].channel_delay == pytest.approx(1.0 / RATE, rel=0.01)
     found = compared(fitted.model, early)
     assert found.ratio == pytest.approx(fitted.fits["x"].ratio, rel=0.1)
-    assert found.position_error["log"] < 3.0 * found.position_floor["log"]
+    assert found.position_error["log"] < 3.0 * found.position_drift_of_noise["log"]
     told = diagnose(STAGE, {"log": early}, catalogue=Catalogue([])).comparison.axes["x"]
     assert told.ratio == pytest.approx(fitted.fits["x"].ratio, rel=1e-6)
     assert told.position_error["log"] == pytest.approx(found.position_error["log"], rel=0.1)
@@ -120,7 +120,7 @@ def test_the_position_error_of_the_true_model_is_what_noise_makes_of_it():
     for seed in (2, 3):
         log = logged(STAGE, seed)
         true, wrong = (
-            c.position_error["log"] / c.position_floor["log"]
+            c.position_error["log"] / c.position_drift_of_noise["log"]
             for c in (compared(STAGE, log), compared(lacking, log))
         )
         assert 0.3 < true < 3.0

@@ -62,7 +62,7 @@ def test_planted_values_are_found_from_a_start_a_tenth_off(slide, log) -> None:
     np.testing.assert_allclose(read(found.axis, where), read(axis, where), rtol=2e-3)
     assert found.error == pytest.approx(NOISE, rel=0.1)  # what is left is the readings' noise
     assert found.error < 1e-3 * found.error_begun
-    assert len(found.starts) == 4
+    assert len(found.errors_of_starts) == 4
 
 
 @pytest.mark.slow

@@ -154,7 +154,7 @@ def test_without_rivals_the_experiment_says_most_about_the_model():
     found = plan(stage, catalogue=CATALOGUE, duration=4.0)
     assert found.decides
     assert found.between == (stage.name,)
-    assert (found.favoured, found.supposed, found.gap.share) == (None, True, None)
+    assert (found.favoured_by_the_logs, found.supposed, found.gap.share) == (None, True, None)
     slow = [t for t in found.ranking if t.motion.motion.velocity.max() < 0.01]
     assert found.chosen.gain > max(t.gain for t in slow) + 1.0
 

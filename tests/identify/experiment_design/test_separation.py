@@ -192,7 +192,7 @@ def test_a_plan_leaves_out_logs_that_refute_a_rival():
     gains = [t.gain for t in found.ranking]
     assert gains == pytest.approx([t.gain for t in without.ranking])
     assert max(gains) < 1.0
-    assert (found.favoured, without.favoured) == ("good", None)
+    assert (found.favoured_by_the_logs, without.favoured_by_the_logs) == ("good", None)
 
 
 def test_properties_are_windowed_means_of_the_motion():

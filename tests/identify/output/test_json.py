@@ -83,7 +83,7 @@ ANSWERS: dict[str, Callable[[], object]] = {
     ),
     "comparison": made.compared,
     "plan between two": lambda: json_of(
-        made.plan_of("cogging", "wear", favoured="wear"), file="e.toml"
+        made.plan_of("cogging", "wear", favoured_by_the_logs="wear"), file="e.toml"
     ),
     "plan for one model": lambda: made.plan_of(
         "the stage", ranking=(replace(made.TRIALS[0], difference=math.nan),), supposed=True
@@ -95,7 +95,7 @@ ANSWERS: dict[str, Callable[[], object]] = {
     ),
     "diagnosis": lambda: json_of(
         made.diagnosed(
-            made.diagnosis_of(unexplained=made.STRUCTURE, repeat=made.REPEAT, small=("wear",))
+            made.diagnosis_of(unexplained=made.STRUCTURE, repeat=made.REPEAT, also_seen=("wear",))
         ),
         data_faults=["run 1: a gap"], left_out=["held 1 stands still"],
     ),
@@ -176,7 +176,7 @@ def test_the_text_of_a_mujoco_file_is_told_where_a_body_is_another_alone() -> No
 
 
 def test_what_is_no_number_or_no_law_is_told() -> None:
-    c = replace(made.comparison_of(), position_floor={"run 1": 0.0, "run 2": 0.0})
+    c = replace(made.comparison_of(), position_drift_of_noise={"run 1": 0.0, "run 2": 0.0})
     found = told(made.Comparison(made.MODEL, {"x": c}))
     ratio = found["axes"]["x"]["logs"]["run 1"]["position_ratio"]
     assert ratio is None or ratio > 1e200

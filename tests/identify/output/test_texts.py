@@ -195,7 +195,9 @@ TEXTS: dict[str, Callable[[], object]] = {
     "comparison without a region above noise": lambda: made.Comparison(
         made.MODEL, {"x": replace(made.comparison_of(), worst=[])}
     ),
-    "plan between two": lambda: made.plan_of("cogging", "wear", favoured="wear", supposed=True),
+    "plan between two": lambda: made.plan_of(
+        "cogging", "wear", favoured_by_the_logs="wear", supposed=True
+    ),
     "plan between two models": lambda: made.plan_of(
         "a.toml", "b.toml", supposed=True, excited_by={}
     ),
@@ -212,7 +214,7 @@ TEXTS: dict[str, Callable[[], object]] = {
     "addition without selection log": lambda: WEAR,
     "a shape given": lambda: replace(WEAR, step=replace(WEAR.step, action="shape")),
     "diagnosis": lambda: made.diagnosed(
-        made.diagnosis_of(unexplained=made.STRUCTURE, repeat=made.REPEAT, small=("wear", "gms"))
+        made.diagnosis_of(unexplained=made.STRUCTURE, repeat=made.REPEAT, also_seen=("wear", "gms"))
     ),
     "diagnosis: one effect": lambda: of(made.diagnosis_of(findings=(ALONE,))),
     "diagnosis: two effects": lambda: of(made.diagnosis_of(findings=(ALONE, LUGRE))),

@@ -106,7 +106,7 @@ def test_adding_a_map_lowers_the_errors_of_force_and_position(mapped: Addition) 
     assert mapped.step.holdout_error_after * 5.0 < mapped.step.holdout_error_before
     assert "not a physical law" in mapped.notes[0]
     assert mapped.position_error[1] < mapped.position_error[0]
-    assert mapped.replayed == pytest.approx(mapped.position_error[1], rel=0.02)
+    assert mapped.position_error_in_mujoco == pytest.approx(mapped.position_error[1], rel=0.02)
 
 
 def test_the_shape_is_recovered_and_the_physics_keeps_its_values(

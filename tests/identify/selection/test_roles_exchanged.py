@@ -34,7 +34,7 @@ def test_a_law_that_one_log_alone_proves_is_told_to_depend_on_which_log_chooses(
 ) -> None:
     found = diagnosed(size, ride)
     assert found.named == (("cogging",) if named else ())
-    (law,) = found.by_roles
+    (law,) = found.depends_on_roles
     assert (law.effect, law.named) == ("cogging", named)
     assert all(f.confidence is not None and f.confidence <= 0.75 for f in found.findings)
 
@@ -42,7 +42,7 @@ def test_a_law_that_one_log_alone_proves_is_told_to_depend_on_which_log_chooses(
 def test_of_a_law_that_both_logs_prove_nothing_of_the_kind_is_told() -> None:
     found = diagnosed(0.1, Ride(2))
     assert found.named == ("cogging",)
-    assert not found.by_roles
+    assert not found.depends_on_roles
     assert found.findings[0].confidence == pytest.approx(0.99)
 
 
@@ -54,7 +54,7 @@ def test_a_law_that_a_touched_log_hides_is_told_to_depend_on_roles_whichever_log
     true = having(SLIDE, "cogging", p=0.021, a1=0.03, b1=0.0)
     good, poor = {"good": logged(true, Ride(1))}, {"poor": logged(true, Ride(4), touched)}
     for pair, named in (((good, poor), True), ((poor, good), False)):
-        (law,) = diagnose_axis(*begun(SLIDE, *pair), KNOWN).by_roles
+        (law,) = diagnose_axis(*begun(SLIDE, *pair), KNOWN).depends_on_roles
         assert (law.effect, law.named) == ("cogging", named)
 
 

@@ -151,7 +151,7 @@ def test_a_comparison_gathers_what_the_residual_says():
     assert found.floor == floor_of(axis, logs)
     assert found.total_error == pytest.approx(rms(found.residual))
     assert found.ratio == pytest.approx(found.total_error / found.floor)
-    assert (found.position_error, found.position_floor) == ({"a": 1e-6}, {"a": 2e-7})
+    assert (found.position_error, found.position_drift_of_noise) == ({"a": 1e-6}, {"a": 2e-7})
     names = [*UNITS, "command", "standstill", "roller_spikes_phase", "frequency"]
     assert [m.coordinate for m in found.maps] == names
     where = found.coordinates
@@ -287,13 +287,13 @@ def test_the_twins_own_log_passes_and_a_model_that_lacks_an_effect_fails():
         )
 
     found = tested(STAGE)
-    assert found.passes
+    assert found.passed
     assert found.loop is Feedback.CLOSED
-    assert found.within == pytest.approx(0.9, abs=0.06)
+    assert found.share_within_90 == pytest.approx(0.9, abs=0.06)
     assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0, abs=0.02)
     poor = tested(STAGE.with_axis("x", STAGE.axes["x"].without("cable_slab")))
     assert not any(c.passed for c in poor.correlations)
-    assert poor.within < 0.3
+    assert poor.share_within_90 < 0.3
 
 
 def test_correlations_are_the_plain_sums_at_their_lags():

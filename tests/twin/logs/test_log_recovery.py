@@ -129,7 +129,7 @@ def test_each_extra_that_is_damaged_is_named_and_the_others_are_kept(tmp_path, i
         assert f"metadata at byte {metadata.start}: wrong checksum" in recovery.lost[0]
         assert log.attachments == LOG.attachments
         assert (log.sample_rate, len(log)) == (RATE, COUNT)
-        assert not recovery.unproved
+        assert not recovery.not_proved
         assert "source" not in log.metadata
 
 
@@ -166,7 +166,7 @@ def test_what_no_checksum_proves_comes_back_only_on_request(tmp_path, intact):
     log, recovery = recover_log(path, unproved=True)
     assert len(log) == COUNT
     assert "no checksum" in log.metadata["not_proved"]
-    assert f"chunk at byte {chunk.start}: has no checksum" in "; ".join(recovery.unproved)
+    assert f"chunk at byte {chunk.start}: has no checksum" in "; ".join(recovery.not_proved)
 
 
 @pytest.mark.slow

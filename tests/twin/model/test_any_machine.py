@@ -142,7 +142,7 @@ def test_the_hidden_effect_is_named_and_added(gone_round: Round) -> None:
     assert gone_round.added.step.unit == gone_round.units.force
     before, after = gone_round.added.position_error
     assert after < 0.5 * before
-    assert gone_round.added.replayed == pytest.approx(after, rel=1e-6)
+    assert gone_round.added.position_error_in_mujoco == pytest.approx(after, rel=1e-6)
     again = parse_model(
         tomllib.loads(format_model(gone_round.added.model)), CATALOGUE, None, "again.toml"
     )

@@ -58,7 +58,7 @@ def test_the_friction_of_an_imposed_motion_is_found_without_a_mass(logs) -> None
     assert found.mass == 0.0
     for name, value in YIELDS.items():
         assert found["dahl"].values[name] == pytest.approx(value, rel=0.02)
-    assert (added.position_error, added.replayed) == (None, None)
+    assert (added.position_error, added.position_error_in_mujoco) == (None, None)
     assert "position" not in str(added)
     compared = workflow.compare(added.model, logs[1])
     assert "position error" not in str(compared)
