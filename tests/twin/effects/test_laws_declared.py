@@ -62,6 +62,14 @@ def test_a_part_of_a_whole_stays_below_the_whole() -> None:
             assert p.upper < 1.0 or p.name == "ratio" or (p.name == "loss" and p.upper > 1.0)
 
 
+def test_what_reads_joints_is_of_joints_and_what_reads_another_axis_is_not() -> None:
+    for effect in (e for e in CATALOGUE.values() if not e.is_nonparametric):
+        if effect.reads("LOAD") or effect.reads("SPEEDS"):
+            assert effect.of_joints, effect.name
+        if effect.reads_other_axis:
+            assert effect.of_joints is False, effect.name
+
+
 def test_all_but_a_friction_is_absent_at_its_start() -> None:
     for effect in CATALOGUE.values():
         friction = effect.kind is Kind.FRICTION

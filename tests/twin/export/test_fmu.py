@@ -4,6 +4,7 @@ import ctypes
 import io
 import re
 import zipfile
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from c_compiler import UNDEFINED, given, library, needs_compiler
 from effect_runs import CATALOGUE
 
-from twin.export import find_exporter
+from twin.export import compare_export, find_exporter
 from twin.export.formats.fmu import WRAPPER
 from twin.feedforward import feedforward
 from twin.model.file import load_model
@@ -161,3 +162,32 @@ def test_no_name_of_a_model_is_in_the_way_of_c_or_of_the_format(name):
     x = STAGE.axes["x"]
     made = find_exporter("fmu").export(MachineModel(name, {"int": x}, STAGE.sample_rate), {})
     assert not [r for r in made.lost if r.part == "binary"]
+
+
+@pytest.mark.parametrize(
+    ("compiler", "why"),
+    [
+        (None, "no C compiler was found"),
+        ("echo 'model.c:3: broken' >&2; echo later >&2; exit 1", "failed: model.c:3: broken"),
+        ("exit 1", "failed: nothing said"),
+    ],
+)
+def test_without_a_library_it_is_said_why(tmp_path, monkeypatch, compiler, why) -> None:
+    if compiler:
+        (tmp_path / "cc").write_text(f"#!/bin/sh\n{compiler}\n")
+        (tmp_path / "cc").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    made = find_exporter("fmu").export(STAGE, {})
+    bare = [remark for remark in made.lost if remark.part == "binary"]
+    assert [remark.axis for remark in bare] == list(STAGE.axes)
+    assert all(why in remark.text for remark in bare)
+
+
+def test_it_is_that_of_the_model_or_of_one_before(tmp_path) -> None:
+    made = find_exporter("fmu").export(STAGE, {})
+    path = tmp_path / "proton_motion_stage.fmu"
+    path.write_bytes(made.files[path.name])
+    assert compare_export(STAGE, path, {}).agrees
+    heavier = STAGE.with_axis("x", replace(STAGE.axes["x"], mass=1.1 * STAGE.axes["x"].mass))
+    (outdated,) = compare_export(heavier, path, {}).outdated
+    assert (outdated.file, outdated.line) == (str(path), None)
