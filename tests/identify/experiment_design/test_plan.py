@@ -137,6 +137,10 @@ def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     subject = Subject("test", found)
     card = next(s for s in sections(subject) if s.anchor == "answer").blocks[0]
     assert any("twin plan" in remark for remark in card.remarks)
+    # So does a plan that is asked for nothing but the logs.
+    asked = plan(case.stage, *logs, catalogue=catalogue, duration=DURATION, test_function=WINDOW)
+    assert set(asked.between) == set(case.pair)
+    assert asked.decides
 
 
 def test_what_no_motion_tells_apart_is_said():
