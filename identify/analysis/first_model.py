@@ -158,7 +158,11 @@ def _first_values(
         ]
         found = first_values(motions, mass)
         if found.mass is not None:
-            break
+            return motions, found
+    # What one log that was recorded otherwise hides in all of them, the others tell.
+    telling = [m for m in motions if first_values([m]).mass is not None]
+    if telling and not found.reversed:
+        found = first_values(telling)
     return motions, found
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_runs import refusal, twin
+from planted_logs import SLIDE, Ride, logged
 from scipy.signal import butter, cont2discrete, lfilter
 
 from identify import workflow
@@ -237,6 +238,18 @@ def test_logs_that_tell_no_mass_stand_still_or_differ_in_rate_are_refused():
         first_model({"l": still}, "m", CATALOGUE)
     with pytest.raises(InputError, match="sampled at 500, 1000 Hz"):
         first_model({"l": drive(), "m": drive(rate=500.0)}, "m", CATALOGUE)
+
+
+def test_what_one_late_log_hides_in_all_the_others_tell() -> None:
+    """By as much as it hides the acceleration of a light axis behind its friction."""
+    light = replace(SLIDE, mass=0.2)
+    logs = {f"run{i}": logged(light, Ride(20 + i)) for i in range(3)}
+    own = logs["run1"].axes["x"]
+    late = {**own.columns, "force": np.roll(own.columns["force"], 100)}
+    logs["run1"] = replace(logs["run1"], axes={"x": AxisLog(late, own.units)})
+    with pytest.raises(InputError, match="cannot tell the mass"):
+        first_model({"run1": logs["run1"]}, "m", CATALOGUE)
+    assert first_model(logs, "m", CATALOGUE).axes["x"].mass == pytest.approx(0.2, rel=0.02)
 
 
 def test_a_force_of_the_other_sign_is_refused_as_what_it_is():
