@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import expm
 
-from identify.frequency.response import Complex, Record
+from identify.frequency.response import Complex, LoopSignals
 from twin.signals import Array
 
 CELLS = 2000  # samples of a period of the setpoint
@@ -77,7 +77,7 @@ class TwoMasses:
         turn = 2.0 * np.pi * self.bandwidth
         return self.mass * turn**2 / 3.0, self.mass * turn
 
-    def run(self, setpoint: Array, rng: np.random.Generator) -> Record:
+    def run(self, setpoint: Array, rng: np.random.Generator) -> LoopSignals:
         """The loop along a setpoint (n,) m."""
         state, before, now, whole = self._step
         stiff, rate = self._gains
@@ -91,7 +91,7 @@ class TwoMasses:
             last = setpoint[i - 1] - reading[i - 1] if i else 0.0
             force[i] = sent[i + whole + 1] = stiff * error + rate * (error - last) / self.period
             x = state @ x + before * sent[i] + now * sent[i + 1]
-        return Record(setpoint, force, reading, self.period)
+        return LoopSignals(setpoint, force, reading, self.period)
 
 
 def multisine(samples: int, rng: np.random.Generator) -> Array:

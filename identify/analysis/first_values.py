@@ -43,7 +43,7 @@ class FirstValues:
 
 
 @dataclass(frozen=True)
-class Regression:
+class FirstRegression:
     """Gains of columns (k, n) in a force (n,), their t-values, and what is left, N RMS."""
 
     gains: Array
@@ -80,7 +80,7 @@ def first_values(motions: Sequence[Motion], mass: float | None = None) -> FirstV
 
 
 def _values(
-    motions: Sequence[Motion], place: tuple[float, bool], found: Regression, mass: float
+    motions: Sequence[Motion], place: tuple[float, bool], found: FirstRegression, mass: float
 ) -> FirstValues:
     """With the friction and the constant that a regression found beside a mass, kg."""
     coulomb, static = found.sure("coulomb"), _static(motions, found, mass, place)
@@ -131,7 +131,7 @@ def _rows(
     return rows[:-1], rows[-1]
 
 
-def _with_friction(columns: Array, force: Array) -> Regression:
+def _with_friction(columns: Array, force: Array) -> FirstRegression:
     """With both kinds of friction where both are sure, else with one, Coulomb's where it may be."""
     both = _regressed(columns, force)
     if min(both.sure("coulomb"), both.sure("viscous")) > 0.0:
@@ -174,7 +174,7 @@ def _without(columns: Array, name: str) -> Array:
     return kept
 
 
-def _regressed(columns: Array, force: Array) -> Regression:
+def _regressed(columns: Array, force: Array) -> FirstRegression:
     """Least squares, with the scatter between blocks of time."""
     size = np.linalg.norm(columns, axis=1)
     size = np.where(size > 0.0, size, 1.0)
@@ -188,11 +188,11 @@ def _regressed(columns: Array, force: Array) -> Regression:
     rounding = 1e-9  # of the force: smaller gains of columns of unit size are none
     error = np.sqrt(np.maximum(variance, 0.0)) + rounding * float(np.linalg.norm(force))
     error = np.maximum(error, np.finfo(float).tiny)  # of no force at all
-    return Regression(gains / size, gains / error, rms(left))
+    return FirstRegression(gains / size, gains / error, rms(left))
 
 
 def _static(
-    motions: Sequence[Motion], found: Regression, mass: float, place: tuple[float, bool]
+    motions: Sequence[Motion], found: FirstRegression, mass: float, place: tuple[float, bool]
 ) -> float | None:
     """The friction (N) at which the axis breaks away from rest; None where it seldom does.
 

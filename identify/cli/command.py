@@ -53,7 +53,7 @@ AS_JSON = inspect.Parameter(
 
 
 @dataclass(frozen=True)
-class Said:
+class Reply:
     """What a command says: text or, with --json, the answer; warnings on standard error.
 
     fine: whether the exit code is 0, else 1. unwritten: errors of files that could not be written
@@ -85,7 +85,7 @@ class Commands(typer.Typer):
     """
 
     def command(self, name: str | None = None, **options: Any) -> Any:
-        def register(job: Callable[..., Said]) -> Callable[..., Said]:
+        def register(job: Callable[..., Reply]) -> Callable[..., Reply]:
             own = inspect.signature(job, eval_str=True)
 
             @wraps(job)
@@ -245,7 +245,7 @@ def roughly(seconds: float) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes / 60.0:.1f} h"
 
 
-class Shown:
+class ProgressDisplay:
     """Where a command is: called as a `Progress`, from any thread.
 
     Who is ahead is shown beside the work that it is of, as several axes may be asked at a time.
@@ -289,7 +289,7 @@ def progress_on_stderr(first: float = FIRST, every: float = EVERY) -> Iterator[P
     if sys.stderr is None:  # closed by who started the command
         yield silent
         return
-    shown = Shown()
+    shown = ProgressDisplay()
     try:
         with _bar(shown) if sys.stderr.isatty() else _lines(shown, sys.stderr, first, every):
             yield shown
@@ -300,7 +300,7 @@ def progress_on_stderr(first: float = FIRST, every: float = EVERY) -> Iterator[P
 
 
 @contextmanager
-def _lines(shown: Shown, stream: TextIO, first: float, every: float) -> Iterator[None]:
+def _lines(shown: ProgressDisplay, stream: TextIO, first: float, every: float) -> Iterator[None]:
     """Lines from a thread of their own: they come too while a long piece of work says nothing."""
     ended = Event()
 
@@ -322,7 +322,7 @@ def _lines(shown: Shown, stream: TextIO, first: float, every: float) -> Iterator
 
 
 @contextmanager
-def _bar(shown: Shown) -> Iterator[None]:
+def _bar(shown: ProgressDisplay) -> Iterator[None]:
     from rich.console import Console
     from rich.live import Live
     from rich.progress_bar import ProgressBar

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from identify.cli.command import Said
+from identify.cli.command import Reply
 from identify.cli.shared import app
 from twin.installed import pip_install
 
@@ -42,7 +42,7 @@ class Line:
 
 
 @app.command()
-def doctor() -> Said:
+def doctor() -> Reply:
     """Tell what this installation has, what is missing, and how to get it.
 
     Example: twin doctor
@@ -51,7 +51,7 @@ def doctor() -> Said:
 
     lines = [look() for look in LOOKS]
     ok = not any(line.needed and line.remedy for line in lines)
-    return Said("\n".join(map(str, lines)), DoctorAnswer.of(ok=ok, lines=lines), fine=ok)
+    return Reply("\n".join(map(str, lines)), DoctorAnswer.of(ok=ok, lines=lines), fine=ok)
 
 
 def _twin() -> Line:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Commands, Said, progress_on_stderr, tried
+from identify.cli.command import Commands, Reply, progress_on_stderr, tried
 from identify.cli.shared import Effects, Scheduler, app, written
 from twin.errors import InputError
 from twin.telling import heard
@@ -67,7 +67,7 @@ def ingest(
     scheduler: Scheduler = None,
     workers: Workers = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Check and fit the logs of a folder that the store does not know yet, a record each.
 
     Example: twin fleet ingest nights --model stage.toml --store fleet
@@ -87,7 +87,7 @@ def ingest(
             logs, store, known, pattern=read, scheduler=scheduler, workers=workers,
             progress=progress,
         )  # fmt: skip
-    return Said(ingested_in_words(done), IngestAnswer.of(done), done.told)
+    return Reply(ingested_in_words(done), IngestAnswer.of(done), done.told)
 
 
 @fleet.command()
@@ -97,7 +97,7 @@ def sql(
     ],
     store: StoreOption,
     out: Annotated[Path | None, written("Table to write: .csv, .parquet.")] = None,
-) -> Said:
+) -> Reply:
     """Answer a question in SQL over the views fits, findings and alarms.
 
     Example: twin fleet sql "SELECT machine, max(value) FROM fits GROUP BY machine" --store fleet
@@ -111,7 +111,7 @@ def sql(
     if out:
         found.write(out)
     text = f"{out}: {len(found)} rows" if out else table_text(found.columns, found.rows)
-    return Said(text, SqlAnswer.of(columns=found.columns, rows=found.rows), found.faults)
+    return Reply(text, SqlAnswer.of(columns=found.columns, rows=found.rows), found.faults)
 
 
 @fleet.command()
@@ -121,7 +121,7 @@ def report(
     logs: Ingested = None,
     model: SameModels = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Tell which machines changed, when and by how much, on a page ranked by what needs attention.
 
     Exit code 1 where a machine changed.
@@ -139,7 +139,7 @@ def report(
     floor, silent = _floor(store, logs, model, effects)
     failed = tried(lambda: write_fleet(html, floor)) if html else ()
     answer = FloorAnswer.of(floor, alarms=floor.alarms)
-    said = Said(floor_in_words(floor), answer, [*floor.faults, *silent], fine=not floor.alarms)
+    said = Reply(floor_in_words(floor), answer, [*floor.faults, *silent], fine=not floor.alarms)
     return replace(said, unwritten=failed)
 
 
@@ -169,7 +169,7 @@ def demo(
     machines: Annotated[int, Option(min=1, help="How many machines.")] = 20,
     nights: Annotated[int, Option(min=1, help="How many nights.")] = 90,
     workers: Workers = None,
-) -> Said:
+) -> Reply:
     """Draw a floor of machines of which three change, find these, and write one page.
 
     Example: twin fleet demo -o fleet-demo
@@ -185,7 +185,7 @@ def demo(
             folder, seed, machines=machines, nights=nights, workers=workers, progress=progress
         )
     text = demo_in_words(made.planted, made.floor, made.right, made.page)
-    return Said(text, FleetDemoAnswer.of(made), silent, fine=made.right)
+    return Reply(text, FleetDemoAnswer.of(made), silent, fine=made.right)
 
 
 @fleet.command()
@@ -197,7 +197,7 @@ def kind(
     ] = None,
     out: Annotated[Path | None, written("Model to write, with the values expected.")] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Tell how the machines of a kind differ, and what is to be expected of a new one.
 
     Example: twin fleet kind stage.toml --store fleet -o new_stage.toml
@@ -222,5 +222,5 @@ def kind(
         )
     failed = tried(lambda: save_model(begun(given, told), out)) if out else ()
     answer = KindAnswer.of(kind=given.name, machine=machine, parameters=list(told), model=out)
-    said = Said(kind_in_words(given.name, told, machine), answer, contents.faults)
+    said = Reply(kind_in_words(given.name, told, machine), answer, contents.faults)
     return replace(said, unwritten=failed)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Said
+from identify.cli.command import Reply
 from identify.cli.shared import app, was_kept, written
 from twin.errors import InputError
 
@@ -49,7 +49,7 @@ def import_(
             "remove; the map is written beside the log.",
         ),
     ] = None,
-) -> Said:
+) -> Reply:
     """Turn a machine's recording into an MCAP log, by a map or by one that is proposed.
 
     Example: twin import recording.csv --map map.toml -o run.mcap
@@ -65,7 +65,7 @@ def import_(
     return _by_map(sources, mapping, out)
 
 
-def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
+def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Reply:
     """A log by the map of a user, with what its signals say against it."""
     from identify.analysis.map_proof import proofs_of
     from twin.importers import import_log, load_mapping
@@ -77,7 +77,7 @@ def _by_map(sources: Sequence[Path], mapping: Path, out: Path) -> Said:
 
 def _logged(
     log: Log, known: ImportMap, mapping: Path, out: Path, proofs: Mapping[str, MapProof]
-) -> Said:
+) -> Reply:
     """Write a log that a map made. proofs: what it makes of each axis."""
     from identify.output.answers.machine import ImportAnswer
     from twin.checks import check_assumed
@@ -98,12 +98,12 @@ def _logged(
         *(f"{mapping}: warning: {doubt}" for doubt in told),
         *(f"{out}: warning: {finding}" for finding in unsure),
     ]
-    return Said(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
+    return Reply(f"{out}: {len(log)} samples at {log.sample_rate:g} Hz", answer, warnings)
 
 
 def _by_edited(
     sources: Sequence[Path], mapping: Path | None, entries: Sequence[str], out: Path | None
-) -> Said:
+) -> Reply:
     """A log by a map, or by the one that is proposed, with entries that the user sets."""
     from twin.entries import toml_document
     from twin.errors import at
@@ -117,7 +117,7 @@ def _by_edited(
     return _written(sources, with_entries(text, entries), out or Path(f"{sources[0].stem}.mcap"))
 
 
-def _guess(sources: Sequence[Path], out: Path | None) -> Said:
+def _guess(sources: Sequence[Path], out: Path | None) -> Reply:
     """A proposed map, printed or written; exit code 1 where something is missing in it."""
     from identify.output.proposal import map_answer
 
@@ -126,7 +126,7 @@ def _guess(sources: Sequence[Path], out: Path | None) -> Said:
     kept = [] if out is None else _kept(out, text)
     said = text if out is None else f"{out}: a map to be read and corrected"
     lacks = found.lacks({})
-    return Said(said, map_answer(found, {}), [*kept, *lacks], not lacks)
+    return Reply(said, map_answer(found, {}), [*kept, *lacks], not lacks)
 
 
 def _kept(path: Path, text: str) -> list[str]:
@@ -149,7 +149,7 @@ def _proposal(sources: Sequence[Path], option: str) -> Proposal:
 # --- the map that is proposed, taken --------------------------------------------------------------
 
 
-def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Said:
+def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Reply:
     """Show what is proposed, ask for what is not known, write the map, and import by it."""
     from identify.output.proposal import map_answer, proposal_text
 
@@ -165,12 +165,12 @@ def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Said:
     if not yes:
         refused = "" if asks else "; --yes takes this map, --map MAP another"
         said = "\n\n".join(filter(None, (shown, f"nothing is written{refused}")))
-        return Said(said, map_answer(found, answers), found.lacks(answers), fine=False)
+        return Reply(said, map_answer(found, answers), found.lacks(answers), fine=False)
     log = out or Path(f"{sources[0].stem}.mcap")
     return _taken(sources[0], found, answers, log, shown)
 
 
-def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: str) -> Said:
+def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: str) -> Reply:
     """Write the map beside the log, and the log where the map is complete."""
     from identify.output.machine import in_shell
     from identify.output.proposal import map_answer
@@ -182,11 +182,11 @@ def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: st
         said = f"{mapping}: the map lacks what is marked NOT KNOWN or '?'; complete it, then"
         said += f"\n  {in_shell('import', source, '--map', mapping, '-o', log)}"
         parts = filter(None, (shown, said))
-        return Said("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)
+        return Reply("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)
     return _written([source], text, log, shown)
 
 
-def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> Said:
+def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> Reply:
     """Write a map beside the log that it makes, and say what it makes of each axis."""
     from identify.analysis.map_proof import proofs_of
     from identify.output.proposal import proof_text

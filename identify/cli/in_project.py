@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from identify.project.filling import Filling
     from identify.project.folder import Folder
 
-_RUN: ContextVar[Run | None] = ContextVar("run", default=None)
+_RUN: ContextVar[ProjectCommand | None] = ContextVar("run", default=None)
 # What a user gives of files that no command of the project made.
 GIVEN_FILES = ("sources", "mapping", "mjcf", "effects")
 
 
 @dataclass(frozen=True)
-class Run:
+class ProjectCommand:
     """A command that belongs to a project. words: as typed; full: as it is typed outside one.
 
     held: the project, which no other command writes into until it is closed.
@@ -73,7 +73,7 @@ def filled(command: Any, ctx: Any, args: Sequence[str]) -> list[str]:
         if added is None:
             return [*args]
         full = _with(command, args, given, filling, added)
-        _RUN.set(Run(folder, command.name, words, (command.name, *full), held.pop_all()))
+        _RUN.set(ProjectCommand(folder, command.name, words, (command.name, *full), held.pop_all()))
         return full
 
 
@@ -102,7 +102,7 @@ def _unset(value: object) -> bool:
 
 
 @contextmanager
-def working() -> Iterator[Run | None]:
+def working() -> Iterator[ProjectCommand | None]:
     """The project of the command that runs, let go at its end; None where there is none."""
     run = _RUN.get()
     if run is None:

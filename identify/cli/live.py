@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Said
+from identify.cli.command import Reply
 from identify.cli.shared import MEASURED, Effects, app, loaded
 from twin.errors import InputError
 
 if TYPE_CHECKING:
     from identify.fleet.live_diagnosis import Background
     from identify.fleet.served import Served
-    from identify.fleet.watch import Source, Watcher, Window
+    from identify.fleet.watch import Watcher, Window, WindowSource
     from identify.results.fleet import LiveAlarm, LiveAxis, LiveCause
 
 ADDRESSES = ("ws://", "wss://")
@@ -48,7 +48,7 @@ def watch(
         ),
     ] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Follow a machine that runs, and tell when the force error of its model changes.
 
     Slow parameters are followed too, and after an alarm the last minutes are diagnosed in the
@@ -80,7 +80,7 @@ def watch(
         causes=run.causes, parameters={n: list(a.parameters) for n, a in run.axes.items()},
         told=source.told,
     )  # fmt: skip
-    return Said("\n".join(lines), answer, source.told, fine=not run.alarms)
+    return Reply("\n".join(lines), answer, source.told, fine=not run.alarms)
 
 
 @dataclass
@@ -93,7 +93,7 @@ class _Run:
     axes: dict[str, LiveAxis] = field(default_factory=dict)
 
     def until_the_end(
-        self, source: Source, patience: float, to: tuple[Show, Background, Served | None]
+        self, source: WindowSource, patience: float, to: tuple[Show, Background, Served | None]
     ) -> None:
         """Follow it, and tell what it says to the terminal, the diagnosis and the clients."""
         from identify.fleet.watch import watch as run
@@ -131,7 +131,7 @@ class _Run:
                 yield f"  {one.name} of axis {name}: {parameter_in_words(one)}"
 
 
-def _source(log: str) -> Source:
+def _source(log: str) -> WindowSource:
     """The file or the server that is followed. Raises InputError where there is none."""
     if log.startswith(ADDRESSES):
         from twin.logs.live import LiveTopics

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from identify.cli.command import Said, progress_on_stderr, require_apart, tried
+from identify.cli.command import Reply, progress_on_stderr, require_apart, tried
 from identify.cli.shared import (
     CheckedRecordings,
     Done,
@@ -71,7 +71,7 @@ def fit(
     ] = Objective.FORCE,
     test_function: TestFunction = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Identify the parameters of the model's effects.
 
     Example: twin fit proton_xy fit.mcap --holdout held.mcap -o fitted.toml
@@ -105,7 +105,7 @@ def compare(
     ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Print the errors of the model, and where it fails.
 
     Example: twin compare fitted.toml test.mcap -o report.html
@@ -139,7 +139,7 @@ def diagnose(
     ] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Find which physical effect is missing, with the evidence for it.
 
     Example: twin diagnose fitted.toml fit.mcap --holdout held.mcap -o why.html --model better.toml
@@ -165,7 +165,7 @@ def diagnose(
     answer = answer_of(done.result, data_faults=done.findings, left_out=done.left_out)
     text = to_text(diagnosis_blocks(done.result, source))
     warnings = [*done.warnings, *_of_rotors(machine, logs)]
-    return Said(text, answer, warnings, unwritten=failed)
+    return Reply(text, answer, warnings, unwritten=failed)
 
 
 def _of_rotors(machine: MachineModel, logs: Sequence[Path]) -> list[str]:
@@ -240,7 +240,7 @@ def add(
         Option("--found", help="Add all that EFFECT found: an answer of `twin diagnose --json`."),
     ] = False,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Add an effect, or the shape of one, refit, and record the error before and after.
 
     Of a machine of joints, link_mass corrects a body: it is written into a copy of the MuJoCo file.
@@ -277,7 +277,7 @@ def remove(
     axis: Annotated[str | None, Option(help="Axis; needed where several have it.")] = None,
     test_function: TestFunction = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Take an effect out, refit the others, and record the error with it and without.
 
     Example: twin remove wear better.toml fit.mcap --holdout held.mcap -o without.toml
@@ -289,7 +289,7 @@ def remove(
     return _with_model(with_logs(job, machine, logs, holdout, test, fits=True), out, machine, True)
 
 
-def _with_model(done: Done[Any], out: Path, given: MachineModel, fine: bool) -> Said:
+def _with_model(done: Done[Any], out: Path, given: MachineModel, fine: bool) -> Reply:
     """What is said of a result whose model is written."""
     failed = tried(partial(_save_with_bodies, done.result.model, out, given))
     said = said_of(done.result, done.warnings, fine, left_out=done.left_out)
@@ -318,7 +318,7 @@ def agree(
         Argument(metavar="[LOG...]", help="MCAP logs that `twin export` was given."),
     ] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Say whether two fits agree within their uncertainties, or an export is still that of a model.
 
     Exit code 1 where they do not.
@@ -338,14 +338,14 @@ def agree(
     return said_of(result, fine=result.agree, a=a, b=b)
 
 
-def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Path]) -> Said:
+def _export_agrees(name: str, model: MachineModel, path: Path, logs: Sequence[Path]) -> Reply:
     from identify.output.answers.machine import ExportAgreementAnswer
     from identify.output.machine import export_agreement_text
     from twin.export import compare_export
 
     found = compare_export(model, path, Recordings(logs))
     answer = ExportAgreementAnswer.of(found, a=name, b=path)
-    return Said(export_agreement_text(found, name, str(path)), answer, fine=found.agrees)
+    return Reply(export_agreement_text(found, name, str(path)), answer, fine=found.agrees)
 
 
 @app.command()
@@ -354,7 +354,7 @@ def feedforward(
     logs: Logs,
     before: Annotated[str | None, Option("--before", help="Model to compare with (.toml).")] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Tell what the model is worth as feedforward: the tracking error with it, in simulation.
 
     Example: twin feedforward better.toml test.mcap --before fitted.toml
@@ -377,7 +377,7 @@ def frf(
     out: Annotated[Path | None, written("The responses to write (.csv, .mcap).")] = None,
     plot: Annotated[Path | None, Option(help="Bode diagram to write (.png, .svg, .pdf).")] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Tell the frequency response of force to position: mass, resonances, delay, margins.
 
     Example: twin frf multisine.mcap fitted.toml --plot bode.png
@@ -422,7 +422,7 @@ def plan(
     test_function: TestFunction = None,
     scheduler: Scheduler = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Choose the experiment that decides between explanations; `twin simulate` runs it.
 
     Example: twin plan fitted.toml --between cogging wear --duration 8 -o next.toml
@@ -472,7 +472,7 @@ def demo(
     seed: Annotated[int, Option(help="Draws the machine and its hidden effect.")] = 2,
     model: ModelOption = "proton_xy",
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Run the whole loop on a machine with a hidden effect.
 
     Example: twin demo -o demo
@@ -496,4 +496,4 @@ def demo(
     )
     verdict = "the diagnosis is right" if result.named else "the diagnosis did not name it"
     text = f"the hidden effect was {hidden}: {verdict}\nreport: {result.report}"
-    return Said(text, answer, fine=result.named)
+    return Reply(text, answer, fine=result.named)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Said, progress_on_stderr
+from identify.cli.command import Reply, progress_on_stderr
 from identify.cli.shared import (
     CheckedRecordings,
     Effects,
@@ -51,7 +51,7 @@ def simulate(
         Option(help="Setpoints for a machine, to write: .csv, .yaml (ROS 2), .st (TwinCAT)."),
     ] = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Run an experiment on the twin in MuJoCo and log it as MCAP.
 
     Example: twin simulate moves --model example_machine --duration 10 -o fit.mcap
@@ -83,7 +83,7 @@ def simulate(
     warnings = [*reach.warnings(), *([asked] if asked else [])]
     lines = [f"{out}: {samples} samples at {rate:g} Hz"]
     lines += [f"{setpoints}: the setpoints, to be run on the machine"] if setpoints else []
-    return Said("\n".join(lines), answer, warnings)
+    return Reply("\n".join(lines), answer, warnings)
 
 
 @app.command()
@@ -105,7 +105,7 @@ def new(
     name: Annotated[
         str | None, Option(help="Name of the machine; that of the file if left out.")
     ] = None,
-) -> Said:
+) -> Reply:
     """Propose a first model from logs: mass, friction, constant force, and their hardware.
 
     Example: twin new run.mcap -o model.toml
@@ -139,7 +139,7 @@ def new(
     doubts += [rotor_in_words(found, model) for found in rotors]
     doubts += [] if kept is None else [was_kept(out, kept)]
     warnings = [*briefly(recorded.findings), *silent, *doubts]
-    return Said("\n".join([text, *not_determined_in_words(unknown)]), answer, warnings)
+    return Reply("\n".join([text, *not_determined_in_words(unknown)]), answer, warnings)
 
 
 def _in_roles(logs: Sequence[Path]) -> list[object]:
@@ -168,7 +168,7 @@ def info(
         Path | None,
         written("Its signals as a table: .csv, .mat, .parquet."),
     ] = None,
-) -> Said:
+) -> Reply:
     """Tell what is in logs: length, rate, axes, signals with units and ranges, and faults.
 
     Example: twin info fit.mcap -o fit.csv
@@ -186,11 +186,11 @@ def info(
         write_table(read_log(logs[0]), out)
     found = {str(path): log_info(path) for path in logs}
     table = "" if out is None else f"\n{out}: its signals as a table"
-    return Said(f"{info_text(found)}{table}", info_answer(found))
+    return Reply(f"{info_text(found)}{table}", info_answer(found))
 
 
 @app.command()
-def check(logs: Logs) -> Said:
+def check(logs: Logs) -> Reply:
     """Say whether logs are fit for identification, what is wrong with them, and which are copies.
 
     Of three logs or more also which one disagrees with the others.
@@ -209,7 +209,7 @@ def check(logs: Logs) -> Said:
 
         reports = with_odd(reports, odd_logs(logs))
     answer = check_answer(reports)
-    return Said(check_text(reports), answer, fine=answer.ok)
+    return Reply(check_text(reports), answer, fine=answer.ok)
 
 
 @app.command()
@@ -220,7 +220,7 @@ def cut(
     stop: Annotated[
         float | None, Option("--to", help="Where it ends, s; the end of LOG if left out.")
     ] = None,
-) -> Said:
+) -> Reply:
     """Write a stretch of a log as a log of its own.
 
     Example: twin cut run.mcap --from 1.5 --to 12 -o good.mcap
@@ -232,7 +232,7 @@ def cut(
     write_log(made, out)
     answer = LogAnswer.of(log=out, samples=len(made), sample_rate=made.sample_rate)
     of = f"{made.metadata['cut']} of {log}"
-    return Said(f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {of}", answer)
+    return Reply(f"{out}: {len(made)} samples at {made.sample_rate:g} Hz, {of}", answer)
 
 
 @app.command()
@@ -242,7 +242,7 @@ def recover(
     unproved: Annotated[
         bool, Option("--unproved", help="Keep samples that no checksum proves as well.")
     ] = False,
-) -> Said:
+) -> Reply:
     """Keep the intact parts of a damaged log: the longest at OUT, the others beside it.
 
     Example: twin recover bad.mcap -o good.mcap
@@ -254,7 +254,7 @@ def recover(
     others = {path: text for path, text in files.items() if path != out}
     answer = RecoveryAnswer.of(recovery, log=out, others=list(others))
     written = [f"{path}: {text}" for path, text in others.items()]
-    return Said("\n".join([str(recovery), *written]), answer)
+    return Reply("\n".join([str(recovery), *written]), answer)
 
 
 @app.command()
@@ -267,7 +267,7 @@ def effects(
     check_: Annotated[
         bool, Option("--check", help="Run the laws that every effect obeys.")
     ] = False,
-) -> Said:
+) -> Reply:
     """Print the catalogue, or one effect with its equation, units and source; or check it.
 
     Example: twin effects cogging --plot cogging.png
@@ -289,19 +289,19 @@ def effects(
             )
         reports = [check_effect(effect) for effect in [catalogue[name] for name in names]]
         answer = laws_answer(reports)
-        return Said(laws_text(reports), answer, fine=answer.ok)
+        return Reply(laws_text(reports), answer, fine=answer.ok)
     if name is not None:
         chosen = catalogue[name]
         if plot is not None:
             from identify.experiment_design.planting import signature
 
             draw(chosen, *signature(chosen, catalogue), plot)
-        return Said(effect_text(chosen), EffectAnswer.of(chosen))
+        return Reply(effect_text(chosen), EffectAnswer.of(chosen))
     if plot is not None:
         raise InputError(f"--plot {plot}: draws one effect; give its NAME")
     everything = list(catalogue.values())
     answers = EffectsAnswer.of(effects=everything)
-    return Said(effects_text(everything), answers)
+    return Reply(effects_text(everything), answers)
 
 
 @app.command()
@@ -314,7 +314,7 @@ def export(
     ] = None,
     folder: Annotated[Path, written("Folder, or the only file.")] = Path("export"),
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Write the model for a controller or another tool, and tell what that cannot hold of it.
 
     Example: twin export better.toml --to c -o controller
@@ -335,14 +335,14 @@ def export(
         write_atomically(file, content.encode() if isinstance(content, str) else content)
     answer = ExportAnswer.of(made, format=to, files=files)
     text = "\n".join([*map(str, files), export_text(made)])
-    return Said(text, answer, briefly(recorded.findings))
+    return Reply(text, answer, briefly(recorded.findings))
 
 
 @app.command()
 def example(
     name: Annotated[str | None, Argument(help="Which example; all are listed if left out.")] = None,
     folder: Annotated[Path | None, written("New folder; NAME if left out.")] = None,
-) -> Said:
+) -> Reply:
     """Write an example with its data and the commands to type, or list the examples.
 
     Example: twin example hidden_effect
@@ -353,14 +353,14 @@ def example(
     if name is None:
         width, summaries = max(map(len, EXAMPLES)), {n: e.summary for n, e in EXAMPLES.items()}
         lines = [f"{key:{width}s}  {summary}" for key, summary in summaries.items()]
-        return Said("\n".join(lines), ExamplesAnswer(examples=summaries))
+        return Reply("\n".join(lines), ExamplesAnswer(examples=summaries))
     into = folder or Path(name)
     chosen, files = write_example(name, into)
     lines = [f"{into}: {', '.join(file.name for file in files)}"]
     lines += [f"data: {chosen.data}"] if chosen.data else []
     lines += ["now:", f"  cd {into}", *(f"  {command}" for command in chosen.commands)]
     answer = ExampleAnswer.of(chosen, folder=into, files=files)
-    return Said("\n".join(lines), answer)
+    return Reply("\n".join(lines), answer)
 
 
 Gain = Annotated[
@@ -390,7 +390,7 @@ def view(
     speed: Annotated[float, Option(help="Speed of the replay; 1 is real time.")] = 1.0,
     gain: Gain = None,
     effects: Effects = None,
-) -> Said:
+) -> Reply:
     """Show the machine as measured, as modelled and as commanded, with forces and what is left.
 
     In MuJoCo's viewer, unless a page, a video or a recording is asked for.
@@ -436,7 +436,7 @@ def _write(
 
 def _said_of_view(
     shown: Replay, log: Path, gain: float, silent: list[str], files: Mapping[str, Path | None]
-) -> Said:
+) -> Reply:
     """What was written of a log, and how large differences are drawn in it."""
     from identify.output.answers.machine import ViewAnswer
 
@@ -448,4 +448,4 @@ def _said_of_view(
     drawn = "at their true size" if gain == 1.0 else f"{gain:g} times as large"
     said = f"{seconds:.3g} s of {log}, differences drawn {drawn}"
     text = "\n".join(f"{path}: {said}" for path in files.values() if path)
-    return Said(text, answer, [*silent, *shown.notes])
+    return Reply(text, answer, [*silent, *shown.notes])

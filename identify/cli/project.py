@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from identify.cli.command import Commands, Said
+from identify.cli.command import Commands, Reply
 from identify.cli.shared import app
 from twin.errors import InputError
 
@@ -23,7 +23,7 @@ app.add_typer(projects, name="project", short_help=ABOUT)
 @projects.command()
 def init(
     folder: Annotated[Path, Argument(metavar="[FOLDER]", help="The project's folder.")] = Path(),
-) -> Said:
+) -> Reply:
     """Make a folder a project; commands in it need no arguments.
 
     Example: twin project init
@@ -41,7 +41,7 @@ def init(
 def role(
     logs: Annotated[list[Path], Argument(metavar="LOG...", help="Recordings of the project.")],
     to: Annotated[str, Option("--to", help="training, selection or test.")],
-) -> Said:
+) -> Reply:
     """Say what recordings are for: to fit, to choose effects, or to test.
 
     Example: twin project role logs/run3.mcap --to test
@@ -75,7 +75,7 @@ def take(
     to: Annotated[
         str | None, Option("--to", help="training, selection or test; proposed if left out.")
     ] = None,
-) -> Said:
+) -> Reply:
     """Take MCAP logs into the project where they lie.
 
     Example: twin project take run1.mcap run2.mcap
@@ -105,7 +105,7 @@ def take(
 @projects.command()
 def leave(
     logs: Annotated[list[Path], Argument(metavar="LOG...", help="Recordings of the project.")],
-) -> Said:
+) -> Reply:
     """Leave recordings out of the project; no file is removed.
 
     Example: twin project leave logs/run3.mcap
@@ -126,7 +126,7 @@ def leave(
 
 
 @app.command()
-def log() -> Said:
+def log() -> Reply:
     """Tell what is in the project of this folder: its models in order, with their errors.
 
     Example: twin log
@@ -136,7 +136,7 @@ def log() -> Said:
 
 
 @app.command()
-def undo() -> Said:
+def undo() -> Reply:
     """Take the last change of the project back; no file is removed.
 
     Example: twin undo
@@ -169,10 +169,10 @@ def _role(name: str) -> RoleName:
     raise InputError(f"--to {name}: give {', '.join(ROLES[:-1])} or {ROLES[-1]}")
 
 
-def _said(here: Folder, project: Project) -> Said:
+def _said(here: Folder, project: Project) -> Reply:
     from identify.output.answers.project import ProjectAnswer
     from identify.output.project import project_text
     from identify.project.history import commands
 
     answer = ProjectAnswer.of(project, history=commands(here))
-    return Said(project_text(here.root.resolve().name, project), answer)
+    return Reply(project_text(here.root.resolve().name, project), answer)

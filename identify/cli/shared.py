@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 import typer
 from typer import Argument, Option
 
-from identify.cli.command import Commands, Said, progress_on_stderr
+from identify.cli.command import Commands, Reply, progress_on_stderr
 from identify.output.machine import briefly
 from twin.errors import InputError
 from twin.telling import heard
@@ -252,8 +252,8 @@ def tell_first_look(model: MachineModel, logs: Sequence[Path], catalogue: Catalo
             typer.echo(f"twin: {first_look_in_words(str(logs[0]), found)}", err=True)
 
 
-def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Said:
+def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Reply:
     """What a command says of a result; more: entries of its JSON object that the command knows."""
     from identify.output.as_json import answer_of
 
-    return Said(str(result), answer_of(result, **more), warnings, fine)
+    return Reply(str(result), answer_of(result, **more), warnings, fine)

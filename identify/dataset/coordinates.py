@@ -12,7 +12,7 @@ from identify.dataset.dataset import ENOUGH
 from identify.dataset.motion import REST_SPEED, Motion
 from identify.dataset.prepared_log import PreparedLog, last_direction
 from identify.dataset.readings import FEWEST_CYCLES
-from identify.dataset.spectrum import Record, find_lines, lines_in_time
+from identify.dataset.spectrum import ScatteredSignal, find_lines, lines_in_time
 from identify.rules import RULE
 from twin.core.walks import CHANNEL_ROW
 from twin.effect import CHANNELS, Excitation
@@ -186,7 +186,7 @@ def ripples(motions: Sequence[Motion]) -> tuple[float, ...]:
     by v^2 has a line in position.
     """
     position = np.concatenate([m.position for m in motions])
-    record = Record(position, np.concatenate([_rest(m) * m.velocity**2 for m in motions]))
+    record = ScatteredSignal(position, np.concatenate([_rest(m) * m.velocity**2 for m in motions]))
     if record.span <= 0.0:
         return ()
     found = find_lines([record], FEWEST_CYCLES / record.span, np.inf)

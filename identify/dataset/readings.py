@@ -18,7 +18,7 @@ import numpy as np
 
 from identify.dataset.spectrum import (
     MOST_LINES,
-    Record,
+    ScatteredSignal,
     fitted_levels,
     median_spectrum,
     strongest_line,
@@ -159,7 +159,9 @@ def _ripple_periods(logged: bytes) -> tuple[float, ...]:
     finest = min(cycles / span, 0.5 / step if step else np.inf)
     found: list[float] = []
     for _ in range(MOST_LINES):
-        frequency, share = strongest_line(Record(place, bend), FEWEST_CYCLES / span, finest, least)
+        frequency, share = strongest_line(
+            ScatteredSignal(place, bend), FEWEST_CYCLES / span, finest, least
+        )
         chance = np.log(cycles) + 0.5 * len(bend) * np.log1p(-min(share, 0.5))
         if share < least or chance > np.log(RULE.line_chance):
             break

@@ -118,7 +118,7 @@ def _not_negative(columns: Array, wanted: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class ScatteredSignal:
     """A signal over a coordinate, in any order and spacing: coordinate (n,), values (n,)."""
 
     coordinate: Array
@@ -149,7 +149,7 @@ class SpectralLine:
 
 
 def find_lines(
-    records: Sequence[Record],
+    records: Sequence[ScatteredSignal],
     lowest: float,
     highest: float,
     *,
@@ -186,7 +186,7 @@ def find_lines(
 
 
 def strongest_line(
-    record: Record, lowest: float, highest: float, least: float
+    record: ScatteredSignal, lowest: float, highest: float, least: float
 ) -> tuple[float, float]:
     """Frequency from ``lowest`` to ``highest`` of the strongest sine, and its share of variance.
 
@@ -214,7 +214,7 @@ def lines_in_time(
     forces: Sequence[tuple[Array, float]], most: int = MOST_LINES
 ) -> tuple[float, ...]:
     """Frequencies (Hz) at which forces (n,) N repeat, with their sample periods (s)."""
-    records = [Record(period * np.arange(len(f), dtype=float), f) for f, period in forces]
+    records = [ScatteredSignal(period * np.arange(len(f), dtype=float), f) for f, period in forces]
     longest = max((r.span for r in records), default=0.0)
     if longest == 0.0:
         return ()
@@ -240,7 +240,7 @@ class _Grid:
     even: bool
 
     @classmethod
-    def of(cls, records: Sequence[Record], highest: float) -> _Grid:
+    def of(cls, records: Sequence[ScatteredSignal], highest: float) -> _Grid:
         first = float(records[0].coordinate[1] - records[0].coordinate[0])
         even = first > 0.0 and all(
             np.allclose(np.diff(r.coordinate), first, atol=0.0) for r in records
@@ -271,7 +271,7 @@ class _Grid:
         shift = float(np.clip(0.5 * (a - c) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
         return float(self.frequencies[k] + shift * self.step)
 
-    def powers(self, records: Sequence[Record]) -> Array:
+    def powers(self, records: Sequence[ScatteredSignal]) -> Array:
         """Power of each record at the frequencies, (records, m)."""
         tapered = [r.values * taper for r, taper in zip(records, self.tapers, strict=True)]
         if not self.even:
@@ -292,12 +292,12 @@ class _Found:
 
 def _peeled(
     grid: _Grid,
-    left: list[Record],
+    left: list[ScatteredSignal],
     inside: NDArray[np.int64],
     empty: Array,
     most: int,
     chance: float,
-) -> tuple[list[_Found], list[Record]]:
+) -> tuple[list[_Found], list[ScatteredSignal]]:
     """Lines at places ``inside`` a grid, one after the other, and the records less all of them.
 
     The search ends where even white noise, which shows the weakest lines, would show one as strong.
@@ -326,8 +326,8 @@ def _peeled(
 
 
 def _less_sine(
-    records: Sequence[Record], frequency: float, step: float
-) -> tuple[float, list[Record]]:
+    records: Sequence[ScatteredSignal], frequency: float, step: float
+) -> tuple[float, list[ScatteredSignal]]:
     """Frequency of the best sine near one, at most a step away, and the records less it."""
     for _ in range(2):  # steps of Gauss and Newton are enough from a line's top
         parts = spread(partial(_sine, frequency=frequency), records)
@@ -338,7 +338,7 @@ def _less_sine(
     return frequency, [replace(r, values=p[0]) for r, p in zip(records, parts, strict=True)]
 
 
-def _sine(record: Record, frequency: float) -> tuple[Array, float, float]:
+def _sine(record: ScatteredSignal, frequency: float) -> tuple[Array, float, float]:
     """What the best sine and a constant leave of a record, (n,), and products of its slope.
 
     The slope of that sine over its frequency, less what its phase and height can make of it: with
@@ -372,7 +372,7 @@ def _false_alarm(height: float, records: int, tried: int) -> float:
     return float(-np.expm1(tried * np.log1p(-min(alone, 1.0 - eps))))
 
 
-def _energy(records: Sequence[Record]) -> float:
+def _energy(records: Sequence[ScatteredSignal]) -> float:
     return float(sum(np.sum(r.values**2) for r in records))
 
 

@@ -15,7 +15,7 @@ from identify.dataset.coordinates import OTHER, QUANTITIES, beside, gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import PreparedLog, on_blocks, total_force
-from identify.dataset.spectrum import Record, SpectralLine, find_lines
+from identify.dataset.spectrum import ScatteredSignal, SpectralLine, find_lines
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import effective_samples
 from identify.estimation.fit import Fit
@@ -159,11 +159,11 @@ def line(
     runs: where further runs begin, between which the line keeps its period but not its phase.
     """
     parts = zip(np.split(coordinate, runs), np.split(residual, runs), strict=True)
-    best = _strongest([Record(*part) for part in parts])
+    best = _strongest([ScatteredSignal(*part) for part in parts])
     return (best.period, best.share) if best and best.share > RULE.line_share else None
 
 
-def _strongest(records: Sequence[Record]) -> SpectralLine | None:
+def _strongest(records: Sequence[ScatteredSignal]) -> SpectralLine | None:
     """The strongest line that all the records share and that is no chance, if there is one."""
     span = max(r.span for r in records)
     if span == 0.0:
@@ -201,7 +201,7 @@ def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:
     logs = (*dataset.training, *dataset.selection)
     if len(logs) < 2:
         return None
-    records = [Record(log.motion.position, _left_on_blocks(fit, log)) for log in logs]
+    records = [ScatteredSignal(log.motion.position, _left_on_blocks(fit, log)) for log in logs]
     lines = [_strongest([record]) for record in records]
     periods = [line.period for line in lines if line is not None]
     if len(periods) < len(logs) or np.ptp(periods) > SAME_PERIOD * periods[0]:

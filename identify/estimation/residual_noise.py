@@ -25,7 +25,7 @@ from identify.dataset.coordinates import gathered
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import FEWEST
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
-from identify.dataset.spectrum import Record, find_lines
+from identify.dataset.spectrum import ScatteredSignal, find_lines
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import SURE, blocks_of, by_blocks, effective_samples, rms
@@ -228,7 +228,7 @@ def _repeats(force: Array, at: Array, runs: Sequence[int] | NDArray[np.int64]) -
     parts = zip(np.split(at, runs), np.split(force, runs), strict=True)
     # Of fewer cycles than its knots can follow curves tell, and slow noise has some.
     lowest, highest = 0.5 * HATS / span, len(force) / (OVERLAP * span)
-    records = [Record(*part) for part in parts]
+    records = [ScatteredSignal(*part) for part in parts]
     found = find_lines(records, lowest, highest, most=LINES, chance=RULE.line_chance)
     return any(line.share > RULE.line_share for line in found)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.dataset.spectrum import Record, find_lines
+from identify.dataset.spectrum import ScatteredSignal, find_lines
 from identify.estimation.least_squares import orthonormal, unabsorbed
 from twin.signals import Array
 
@@ -35,7 +35,7 @@ def spatial_periods(
     # 0.25 cycles a sample: half of what the samples can tell where they are even
     highest = 0.25 * len(position) / span
     found = find_lines(
-        [Record(position, force * weight)], FEWEST_CYCLES / span, highest,
+        [ScatteredSignal(position, force * weight)], FEWEST_CYCLES / span, highest,
         most=3, chance=1.0,  # false-alarm probability up to which a line is tried
     )  # fmt: skip
     lines = (line.period for line in found)

@@ -13,7 +13,7 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from identify.fleet.change_point import Change, changes
+from identify.fleet.change_point import LevelChange, changes
 from identify.fleet.nights import FORCE_ERROR, TO_DEVIATION, Panel, median
 from identify.fleet.rates import level_of
 from identify.results.fleet import Alarm, Scope
@@ -158,7 +158,7 @@ def _restored(shown: Relative, machine: int) -> Callable[[float], float]:
 
 
 def _chains(
-    shown: Relative, values: Array, found: Sequence[Change], nights: Nights,
+    shown: Relative, values: Array, found: Sequence[LevelChange], nights: Nights,
     restore: Callable[[float], float],
 ) -> Iterator[Alarm]:  # fmt: skip
     """The alarms of a series; changes the same way, one behind the other, are one that grows."""
@@ -173,8 +173,8 @@ def _chains(
 
 
 def _alarm(
-    shown: Relative, values: Array, edges: Sequence[int], chain: Sequence[Change], nights: Nights,
-    restore: Callable[[float], float],
+    shown: Relative, values: Array, edges: Sequence[int], chain: Sequence[LevelChange],
+    nights: Nights, restore: Callable[[float], float],
 ) -> Alarm:  # fmt: skip
     panel, first = shown.panel, chain[0]
     before, after = values[edges[0] : edges[1]], values[edges[-2] : edges[-1]][-LAST_NIGHTS:]

@@ -33,7 +33,7 @@ MOST_ALIKE = 0.9  # of neighbouring nights, correlation
 
 
 @dataclass(frozen=True)
-class Change:
+class LevelChange:
     """A change of a series, by the numbers of its nights.
 
     told: after which night; first: the first night that differs, with the ends of its 90 % band;
@@ -47,13 +47,13 @@ class Change:
     strength: float
 
 
-def changes(values: Array, variances: Array, dead: float, level: float) -> list[Change]:
+def changes(values: Array, variances: Array, dead: float, level: float) -> list[LevelChange]:
     """The changes of a series (n,) of nights, in their order; each is the begin of a new series.
 
     variances (n,): of the values within their nights; dead: change that is none, in their unit.
     level: standard deviations of a normal distribution at which a change is told (``rates``).
     """
-    out, begin = list[Change](), 0
+    out, begin = list[LevelChange](), 0
     asked, dated = (without_odd(values, dead, n) for n in (0, NEIGHBOURS // 2 + 1))
     limits = limits_at(level, len(values))
     while (told := _night_of_change(asked[begin:], variances[begin:], dead, limits)) >= 0:
@@ -63,7 +63,7 @@ def changes(values: Array, variances: Array, dead: float, level: float) -> list[
         weights = np.cumsum(np.exp(0.5 * (scores**2 - scores[best] ** 2)) * (scores > 0.0))
         low, high = np.searchsorted(weights, np.array([0.05, 0.95]) * weights[-1])
         out.append(
-            Change(begin + told, begin + best, begin + int(low), begin + int(high),
+            LevelChange(begin + told, begin + best, begin + int(low), begin + int(high),
                    float(scores[best]))
         )  # fmt: skip
         begin += best

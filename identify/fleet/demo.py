@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from identify.fleet.cause import with_causes
-from identify.fleet.floor import STAGE, Plan, Planted, nights_of, record_night
+from identify.fleet.floor import STAGE, FloorPlan, Planted, nights_of, record_night
 from identify.fleet.ingest import ingest
 from identify.fleet.models import Models
 from identify.fleet.nights import FORCE_ERROR
@@ -26,7 +26,7 @@ LOGS, STORE, MODEL, PAGE = "logs", "store", "stage.toml", "fleet.html"
 
 
 @dataclass(frozen=True, eq=False)
-class Demo:
+class FleetDemo:
     """What was planted, and what the alarms name."""
 
     floor: Floor
@@ -60,7 +60,7 @@ def demo(
     nights: int = NIGHTS,
     workers: int | None = None,
     progress: Progress = silent,
-) -> Demo:
+) -> FleetDemo:
     """Draw a floor, ingest its logs, and tell what changed; writes logs, model, store and page.
 
     Raises InputError where the folder cannot be written.
@@ -68,7 +68,7 @@ def demo(
     logs, store, page = folder / LOGS, folder / STORE, folder / PAGE
     make_folder(logs)
     write_atomically(folder / MODEL, STAGE.read_bytes())
-    plan, models = Plan.of(), Models.at(STAGE)
+    plan, models = FloorPlan.of(), Models.at(STAGE)
     total = machines * nights
     with engine(workers=workers) as (executor, count):
         made = outcomes(executor, count, record_night, nights_of(logs, machines, nights, seed))
@@ -78,7 +78,7 @@ def demo(
     floor = with_causes(floor_of(Store.opened(store)), logs, models, progress)
     write_fleet(page, floor)
     planted = [p for p in plan.planted if p.machine <= machines and p.night < nights]
-    return Demo(
+    return FleetDemo(
         floor,
         tuple(_planted(p, plan) for p in planted),
         tuple(t for alarm in floor.alarms for t in _named_by(alarm, floor.causes.get(alarm, ()))),
@@ -86,7 +86,7 @@ def demo(
     )
 
 
-def _planted(planted: Planted, plan: Plan) -> Told:
+def _planted(planted: Planted, plan: FloorPlan) -> Told:
     night = (plan.first_night + timedelta(days=planted.night - 1)).date()
     return Told(planted.name, planted.what, night)
 

@@ -66,7 +66,7 @@ class Planted:
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorPlan:
     """What happens on a floor of machines of one kind."""
 
     first_night: datetime
@@ -76,7 +76,7 @@ class Plan:
     planted: Sequence[Planted]
 
     @classmethod
-    def of(cls, path: Path = FLOOR) -> Plan:
+    def of(cls, path: Path = FLOOR) -> FloorPlan:
         """That of a file."""
         given = tomllib.loads(path.read_text(encoding="utf-8"))
         return cls(
@@ -104,7 +104,7 @@ class Night:
 
 def nights_of(folder: Path, machines: int, nights: int, seed: int) -> Iterator[Night]:
     """The logs of a floor, night by night."""
-    warmer = temperatures(Plan.of().hall, nights, np.random.default_rng([seed, 0]))
+    warmer = temperatures(FloorPlan.of().hall, nights, np.random.default_rng([seed, 0]))
     for night in range(nights):
         for machine in range(1, machines + 1):
             yield Night(folder, machine, night, float(warmer[night]), seed)
@@ -124,7 +124,7 @@ def temperatures(hall: Mapping[str, Any], nights: int, rng: np.random.Generator)
 
 def record_night(night: Night) -> None:
     """Run a machine as it is on a night, and write its log."""
-    floor = Plan.of()
+    floor = FloorPlan.of()
     log = simulate(
         _as_it_is(night, floor), "tracking", seed=night.seed + 1000 * night.machine + night.night,
         duration=floor.duration, simulator=ReducedSimulator,
@@ -141,7 +141,7 @@ def _stage() -> MachineModel:
     return load_model(STAGE)
 
 
-def _as_it_is(night: Night, floor: Plan) -> MachineModel:
+def _as_it_is(night: Night, floor: FloorPlan) -> MachineModel:
     """The machine with the values of a night."""
     model = _stage()
     (name, axis), *_ = model.axes.items()

@@ -25,7 +25,7 @@ FAR = 5.0  # standard deviations of the kind, by its median, from which a machin
 
 
 @dataclass(frozen=True)
-class Kind:
+class Distribution:
     """How a parameter is distributed over machines: mean, and standard deviation between them."""
 
     mean: float
@@ -39,14 +39,14 @@ class Kind:
         return self.mean + kept * (value - self.mean), float(np.sqrt(kept) * deviation)
 
 
-def kind_of(values: Array, deviations: Array) -> Kind:
+def kind_of(values: Array, deviations: Array) -> Distribution:
     """The kind of machines (m,), each told with this standard deviation (m,)."""
     w = 1.0 / np.maximum(deviations, 1e-9 * np.abs(values).max() + 1e-300) ** 2
     mean = float(w @ values / w.sum())
     excess = float(w @ (values - mean) ** 2) - (len(values) - 1)
     between = max(excess / float(w.sum() - (w**2).sum() / w.sum()), 0.0)
     w = 1.0 / (1.0 / w + between)
-    return Kind(float(w @ values / w.sum()), float(np.sqrt(between)))
+    return Distribution(float(w @ values / w.sum()), float(np.sqrt(between)))
 
 
 def levels(panel: Panel) -> tuple[Array, Array]:

@@ -65,7 +65,7 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RecordOutcome:
     """What became of the log of this name; what: of one without a fit, in words."""
 
     name: str
@@ -95,7 +95,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedLog:
     """A log with the fits of its axes."""
 
     log: Log
@@ -103,7 +103,7 @@ class Fitted:
     fits: FitResult
 
 
-def record(task: Task) -> Outcome:
+def record(task: Task) -> RecordOutcome:
     """Make the record of a log where the store has none. It is the same whoever makes it.
 
     A log that is being written is left for the next time. Raises InputError where the store cannot
@@ -112,18 +112,18 @@ def record(task: Task) -> Outcome:
     try:
         before = task.path.stat()
         if _is_unfinished(task.path):
-            return Outcome(task.name, State.UNFINISHED, WRITING)
+            return RecordOutcome(task.name, State.UNFINISHED, WRITING)
         about, key, found = _known(task)
         if task.store.has(key):
-            return Outcome(task.name, State.KNOWN)
+            return RecordOutcome(task.name, State.KNOWN)
         rows, what = _rows(task, found)
         after = task.path.stat()
     except OSError as error:
-        return Outcome(task.name, State.UNFINISHED, error.strerror or str(error))
+        return RecordOutcome(task.name, State.UNFINISHED, error.strerror or str(error))
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns):
-        return Outcome(task.name, State.UNFINISHED, WRITING)
+        return RecordOutcome(task.name, State.UNFINISHED, WRITING)
     task.store.write(key, [{**about, **row} for row in rows])
-    return Outcome(task.name, State.FAULTY if what else State.FITTED, what)
+    return RecordOutcome(task.name, State.FAULTY if what else State.FITTED, what)
 
 
 def _is_unfinished(path: Path) -> bool:
@@ -191,7 +191,7 @@ def _rows(task: Task, found: tuple[Origin, Machine] | Refused) -> tuple[list[Row
         errors = [str(f) for f in report.findings if f.severity.value == "error"]
         rows = list(_of_check(report))
         if not errors:
-            rows += _of_fit(Fitted(log, report, _fits(task, log, machine)))
+            rows += _of_fit(FittedLog(log, report, _fits(task, log, machine)))
         return rows, "; ".join(errors)
     except Refused as refused:
         row = {"kind": "finding", "severity": "error", "fault": refused.fault.name}
@@ -230,7 +230,7 @@ def _of_check(report: CheckReport) -> Iterator[Row]:
         }  # fmt: skip
 
 
-def _of_fit(made: Fitted) -> Iterator[Row]:
+def _of_fit(made: FittedLog) -> Iterator[Row]:
     """A row a parameter that was free."""
     for axis, fitted in made.fits.fits.items():
         told = made.fits.estimates[axis]

@@ -8,7 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from identify.fleet.columns import VIEWS, Column
+from identify.fleet.columns import VIEWS, StoreColumn
 from identify.fleet.kept_alarms import alarms, as_table
 from identify.fleet.store import Store
 from identify.fleet.views import connected, listed
@@ -20,7 +20,7 @@ WRITERS = (".csv", ".parquet")
 
 
 @dataclass(frozen=True)
-class Found:
+class QueryRows:
     """The rows that answer a question. faults: of files of the store, a line each."""
 
     columns: tuple[str, ...]
@@ -43,7 +43,7 @@ class Found:
         write_atomically(path, stream.getvalue())
 
 
-def ask(query: str, store: Store) -> Found:
+def ask(query: str, store: Store) -> QueryRows:
     """The answer to one SELECT. Raises InputError, in one line, where it is none or is wrong."""
     duckdb = needed("duckdb")
     contents = store.contents()
@@ -61,12 +61,12 @@ def ask(query: str, store: Store) -> Found:
             raise InputError(f"{' '.join(str(error).split())}; {_known()}") from error
     columns = tuple(table.column_names)
     rows = list(zip(*(c.to_pylist() for c in table.columns), strict=True)) if columns else []
-    return Found(columns, rows, table, contents.faults)
+    return QueryRows(columns, rows, table, contents.faults)
 
 
 def _known() -> str:
     return "; ".join(f"{view} has {_names(columns)}" for view, columns in VIEWS.items())
 
 
-def _names(columns: Sequence[Column]) -> str:
+def _names(columns: Sequence[StoreColumn]) -> str:
     return ", ".join(c.name for c in columns)

@@ -18,7 +18,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from identify.fleet.columns import RECORD, TYPES, Column
+from identify.fleet.columns import RECORD, TYPES, StoreColumn
 from twin.engine import needed
 from twin.errors import InputError
 from twin.files import lock, make_folder, write_atomically
@@ -156,7 +156,7 @@ def fault(path: Path) -> str | None:
 
 
 @cache
-def schema(columns: tuple[Column, ...]) -> Any:
+def schema(columns: tuple[StoreColumn, ...]) -> Any:
     """The Arrow schema of columns, without metadata."""
     pa = needed("pyarrow")
     kinds = {c.name: TYPES.get(c.kind) for c in columns}
@@ -165,7 +165,7 @@ def schema(columns: tuple[Column, ...]) -> Any:
     )
 
 
-def table(rows: Sequence[Row], columns: tuple[Column, ...]) -> Any:
+def table(rows: Sequence[Row], columns: tuple[StoreColumn, ...]) -> Any:
     """Rows as an Arrow table; an entry that a row lacks is null."""
     pa, known = needed("pyarrow"), schema(columns)
     arrays = [pa.array([row.get(f.name) for row in rows], f.type) for f in known]

@@ -44,7 +44,7 @@ AGAIN = 0.25  # s between two looks at the file
 WINDOW_NAME = "window"  # of its log
 
 
-class Source(Protocol):
+class WindowSource(Protocol):
     """Where windows come from: a file that grows, or topics of a server."""
 
     ended: bool
@@ -178,7 +178,7 @@ class Watcher:
 
 
 def watch(
-    source: Source, watcher: Watcher, seconds: float = WINDOW, patience: float = 10.0
+    source: WindowSource, watcher: Watcher, seconds: float = WINDOW, patience: float = 10.0
 ) -> Iterator[Window]:
     """The windows of a machine that runs, as they come, until its writer has closed the log.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.analysis.first_model import first_model
 from identify.frequency.plant import Banded, Loop, Plant, loop_of, plant_of
-from identify.frequency.response import Record, Response, response
+from identify.frequency.response import LoopSignals, Response, response
 from twin.effects import load_catalogue
 from twin.errors import InputError
 from twin.logs import Log
@@ -141,5 +141,5 @@ def _shown(logs: Mapping[str, Log], name: str, controller: Controller | None) ->
     return Shown(found, plant, loop_of(found, known))
 
 
-def _record(axis: AxisLog, period: float) -> Record:
-    return Record(axis.columns.get("setpoint_position"), axis.force, axis.position, period)
+def _record(axis: AxisLog, period: float) -> LoopSignals:
+    return LoopSignals(axis.columns.get("setpoint_position"), axis.force, axis.position, period)

@@ -34,7 +34,7 @@ WEAK = 10.0  # F of the force that the instrument makes, below which the ratio o
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class LoopSignals:
     """Signals of one log, (n,) each: setpoint, None where there is none, force, and position."""
 
     setpoint: Array | None
@@ -89,7 +89,7 @@ class Response:
         return Response(**{n: v[kept] if np.ndim(v) else v for n, v in values.items()})
 
 
-def response(records: Sequence[Record], count: int = 200, width: float = 0.03) -> Response:
+def response(records: Sequence[LoopSignals], count: int = 200, width: float = 0.03) -> Response:
     """The response that records show together, at ``count`` frequencies or fewer.
 
     width: half of that over which it is taken as a polynomial, of the frequency: a resonance of
@@ -147,7 +147,7 @@ class _Spectra:
     period: float
 
     @classmethod
-    def of(cls, record: Record) -> _Spectra:
+    def of(cls, record: LoopSignals) -> _Spectra:
         drive = record.force if record.setpoint is None else record.setpoint
         signals = np.stack([drive, record.force, record.position])
         bent = np.diff(signals, 2)  # which has no trend: what drifts would leak everywhere

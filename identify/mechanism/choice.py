@@ -16,7 +16,7 @@ import numpy as np
 
 from identify.estimation.residual_noise import SHIFTS
 from identify.mechanism.groups import Group
-from identify.mechanism.regression import Regression, Rows, Solution
+from identify.mechanism.regression import GroupSolution, Regression, Rows
 from identify.rules import RULE
 from identify.selection.acceptance import Score
 from twin.signals import Array
@@ -47,7 +47,7 @@ class Choice:
     regression: Regression
 
     @cached_property
-    def _known(self) -> dict[Chosen, Solution]:
+    def _known(self) -> dict[Chosen, GroupSolution]:
         return {}
 
     @cached_property
@@ -58,7 +58,7 @@ class Choice:
     def _rough(self) -> dict[Chosen, float]:
         return {}
 
-    def solution(self, chosen: Chosen) -> Solution:
+    def solution(self, chosen: Chosen) -> GroupSolution:
         """With values that are possible."""
         if chosen not in self._known:
             self._known[chosen] = self.regression.feasible(chosen)

@@ -22,7 +22,7 @@ from identify.estimation.intervals import half_widths_by
 from identify.mechanism.bodies import WrongBody
 from identify.mechanism.choice import Choice, Moved
 from identify.mechanism.groups import Group, groups_of
-from identify.mechanism.regression import Regression, Solution, regression_of
+from identify.mechanism.regression import GroupSolution, Regression, regression_of
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
@@ -297,7 +297,7 @@ class _Estimated:
         return cls(changes, told, apart)
 
 
-def _beside_gains(regression: Regression, asked: Sequence[int]) -> Solution | None:
+def _beside_gains(regression: Regression, asked: Sequence[int]) -> GroupSolution | None:
     """The same beside the torque constants of all joints; None where the logs ask for none."""
     known = np.full(1, ACCURACY)
     groups = [replace(g, scale=known) if g.what is What.GAIN else g for g in regression.groups]

@@ -77,7 +77,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class GroupSolution:
     """Values (p,) of all columns, zero where they were not asked, and the squares that are left.
 
     training, other: of the two groups of logs. parameters: beside the free ones of the joints, the
@@ -106,7 +106,9 @@ class Regression:
     samples: tuple[float, float]
     logs: Sequence[str]
 
-    def solved(self, chosen: Iterable[int], held: Mapping[int, Array] | None = None) -> Solution:
+    def solved(
+        self, chosen: Iterable[int], held: Mapping[int, Array] | None = None
+    ) -> GroupSolution:
         """The least squares with some groups beside the base; held: groups at these values."""
         asked, held = sorted(chosen), held or {}
         every, training, other = self._beside_base
@@ -125,7 +127,7 @@ class Regression:
             values[free] = both[:, 0] / size
             effective += float(np.trace(both[:, 1:] / size[:, None]))
         whole = every @ np.concatenate([[1.0], values])
-        return Solution(whole, _squares(training, values), _squares(other, values), effective)
+        return GroupSolution(whole, _squares(training, values), _squares(other, values), effective)
 
     def _of_group(self, g: int) -> NDArray[np.int_]:
         """The columns of a group, counted from the first of all groups."""
@@ -164,7 +166,7 @@ class Regression:
             out[span] += rows / self.samples[0] / group.scale**2
         return np.asarray(out)
 
-    def feasible(self, chosen: Iterable[int]) -> Solution:
+    def feasible(self, chosen: Iterable[int]) -> GroupSolution:
         """The same with values that bodies, rotors and frictions can have."""
         asked = sorted(chosen)
         found = self.solved(asked)
@@ -210,7 +212,7 @@ class Regression:
         inverse = np.linalg.inv(whole / size / size[:, None]) / size / size[:, None]
         return np.asarray(np.diag(inverse) * prior < most)
 
-    def disagreeing(self, chosen: Sequence[int], found: Solution, group: int) -> list[str]:
+    def disagreeing(self, chosen: Sequence[int], found: GroupSolution, group: int) -> list[str]:
         """Names of the logs that by themselves tell another change of a group than all together.
 
         Beside the same other groups, and the joints' own parameters as each log has them.
@@ -227,13 +229,13 @@ class Regression:
                 out.append(self.logs[number])
         return out
 
-    def left(self, found: Solution) -> tuple[Array, Array]:
+    def left(self, found: GroupSolution) -> tuple[Array, Array]:
         """What a solution leaves of the rows of both groups of logs, in their weights."""
         both = (self.training, self.other)
         one, other = (rows.force - rows.columns @ found.values for rows in both)
         return one, other
 
-    def is_noise(self, found: Solution) -> bool:
+    def is_noise(self, found: GroupSolution) -> bool:
         """Whether a solution leaves of every joint about what nothing here can explain."""
         each = zip(self.left(found), (self.training, self.other), strict=True)
         return all(
@@ -242,7 +244,7 @@ class Regression:
             for joint in np.unique(rows.joint)
         )
 
-    def score(self, before: Solution, after: Solution, among: int = 1) -> Score:
+    def score(self, before: GroupSolution, after: GroupSolution, among: int = 1) -> Score:
         """What one solution takes of what another leaves, over all joints (``acceptance``)."""
         first, then = self.left(before), self.left(after)
         charge = max(after.parameters - before.parameters, 0.0) / self.samples[0]
@@ -250,7 +252,7 @@ class Regression:
             taken(first[0], then[0], 1.0, charge), taken(first[1], then[1], 1.0), among=among
         )
 
-    def criterion(self, found: Solution) -> float:
+    def criterion(self, found: GroupSolution) -> float:
         """How much speaks against a solution: Schwarz's criterion, on both groups of logs."""
         counts = (len(self.training.force), len(self.other.force))
         squares = (found.training, found.other)
@@ -310,7 +312,7 @@ def _with_torques(plain: Regression) -> Regression:
     others = [g for g, group in enumerate(plain.groups) if group.what is not What.GAIN]
     joints = {axis: k for k, axis in enumerate(dict.fromkeys(g.axis for g in plain.groups))}
 
-    def with_prediction(rows: Rows, found: Solution) -> Rows:
+    def with_prediction(rows: Rows, found: GroupSolution) -> Rows:
         predicted = rows.torque + (rows.force - rows.columns @ found.values)
         columns = rows.columns.copy()
         for group, span in zip(plain.groups, plain.spans, strict=True):

@@ -59,7 +59,7 @@ def sentences(said: Iterable[str | Block]) -> list[Block]:
     return [one if isinstance(one, Block) else Sentence(one) for one in said]
 
 
-class Line(Enum):
+class LineStyle(Enum):
     """How a line of a chart is drawn, by report.js."""
 
     LINE = "line"
@@ -84,7 +84,7 @@ class Drawn:
 
     label: str
     values: Array
-    line: Line = Line.LINE
+    line: LineStyle = LineStyle.LINE
     ink: Ink = Ink.BEFORE
 
 
@@ -106,7 +106,7 @@ class Chart(Block):
     @property
     def spec(self) -> dict[str, Any]:
         """What report.js draws."""
-        edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is Line.BAND]
+        edges = [i + 1 for i, drawn in enumerate(self.lines) if drawn.line is LineStyle.BAND]
         dates = {"dates": True} if self.dates else {}
         x = self.x[1].tolist() if self.dates else printed(self.x[1])
         return {

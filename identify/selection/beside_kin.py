@@ -28,7 +28,7 @@ from twin.parallel import Progress, spread
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class FrictionPair:
     """Another friction, and what modifies it."""
 
     friction: Tried
@@ -53,7 +53,7 @@ class _Promised:
         return float(self.there.fit.error * np.sqrt(1.0 - max(takes, 0.0)))
 
 
-def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[Pair]:
+def pairs_beside(judged: Judged, trial: Beside, progress: Progress) -> list[FrictionPair]:
     """The pairs that may leave less than a fit does, refitted, the best first.
 
     Of those whose modifier is accepted beside its friction. None of a joint beside its bodies: what
@@ -93,13 +93,13 @@ def _promised(
             yield _Promised(friction, there, Added(effect).screen(there, controls))
 
 
-def _fitted(judged: Judged, promised: _Promised, among: int) -> Pair:
+def _fitted(judged: Judged, promised: _Promised, among: int) -> FrictionPair:
     """A pair refitted: the friction judged beside what was found, the modifier beside it."""
     there, screening = promised.there, promised.screening
     fit = screening.change.refit(there, screening)
     fit = fit if fit.at_floor else from_all_starts(there, screening, fit)
     alone = Screening(Added(promised.friction), 0.0, (there.fit.axis,))
-    return Pair(
+    return FrictionPair(
         judged_change(judged, alone, there.fit, among),
         judged_change(there, screening, fit, among),
     )

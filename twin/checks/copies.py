@@ -80,7 +80,7 @@ def copies(logs: Mapping[str, Log]) -> tuple[Copy, ...]:
     """
     found: dict[str, Copy] = {}
     shared: list[Copy] = []
-    for pair in combinations([Recording(name, log) for name, log in logs.items()], 2):
+    for pair in combinations([ComparedLog(name, log) for name, log in logs.items()], 2):
         if any(recording.name in found for recording in pair):
             continue
         copy = _copy(*pair)
@@ -92,7 +92,7 @@ def copies(logs: Mapping[str, Log]) -> tuple[Copy, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class ComparedLog:
     """A log with the signals that are compared."""
 
     name: str
@@ -115,7 +115,7 @@ class Recording:
         return {key: step_of(values) for key, values in self.signals.items()}
 
 
-def _copy(first: Recording, second: Recording) -> Copy | None:
+def _copy(first: ComparedLog, second: ComparedLog) -> Copy | None:
     """What two recordings share, if they are one."""
     a, b = _finer_first(first, second)
     every = a.log.sample_rate / b.log.sample_rate
@@ -130,7 +130,7 @@ def _copy(first: Recording, second: Recording) -> Copy | None:
     return None
 
 
-def _finer_first(first: Recording, second: Recording) -> tuple[Recording, Recording]:
+def _finer_first(first: ComparedLog, second: ComparedLog) -> tuple[ComparedLog, ComparedLog]:
     """Two recordings, that first of which the other may be a copy: by rate, steps, length."""
     rates = first.log.sample_rate, second.log.sample_rate
     if abs(rates[1] - rates[0]) > CLOCK * rates[0]:
@@ -147,7 +147,7 @@ def _finer_first(first: Recording, second: Recording) -> tuple[Recording, Record
 # --- where one recording is in the other -----------------------------------------------------
 
 
-def _places(a: Recording, b: Recording, every: float) -> Iterator[int]:
+def _places(a: ComparedLog, b: ComparedLog, every: float) -> Iterator[int]:
     """Numbers of the sample of a at which b may begin, the likeliest first.
 
     By the phases of their spectra, so that what is fast and weak counts as much as the motion.
@@ -181,7 +181,7 @@ def _averaged(signal: Array, over: float) -> Array:
     return signal[: len(signal) // each * each].reshape(-1, each).mean(axis=1)
 
 
-def _refined(a: Recording, b: Recording, every: float, begin: int, reach: int) -> int:
+def _refined(a: ComparedLog, b: ComparedLog, every: float, begin: int, reach: int) -> int:
     """The number within reach of which the signals differ least, up to sign and a constant."""
     shifts = np.arange(-reach, reach + 1)
     differ = np.zeros(len(shifts))
@@ -204,8 +204,8 @@ def _refined(a: Recording, b: Recording, every: float, begin: int, reach: int) -
 class Stretch:
     """What two recordings would share if the samples of b, one for ``every`` of a, begin there."""
 
-    a: Recording
-    b: Recording
+    a: ComparedLog
+    b: ComparedLog
     every: float
     begin: int
 

@@ -12,7 +12,7 @@ _COMMENTS = ("#", "%", "//", "!")
 
 
 @dataclass(frozen=True)
-class Row:
+class BadRow:
     """A row of a file: the number of its line, its text and its cells."""
 
     line: int
@@ -38,11 +38,11 @@ class BadCells:
     def __init__(self, names: Sequence[str], width: int) -> None:
         self._names = names
         self._width = width
-        self._cells: list[tuple[Row, int]] = []
-        self._not_finite: list[tuple[Row, int]] = []
+        self._cells: list[tuple[BadRow, int]] = []
+        self._not_finite: list[tuple[BadRow, int]] = []
         self._headers: list[int] = []
         self._rows = 0
-        self._bad_rows: list[tuple[int, Row, bool]] = []  # index, row, whether any cell is good
+        self._bad_rows: list[tuple[int, BadRow, bool]] = []  # index, row, whether any cell is good
         self._bad_here = 0
 
     @property
@@ -60,12 +60,12 @@ class BadCells:
         """The names of the columns stand in a line again."""
         self._headers.append(line)
 
-    def add(self, row: Row, column: int) -> None:
+    def add(self, row: BadRow, column: int) -> None:
         """A cell is not what it must be."""
         self._cells.append((row, column))
         self._bad_here += 1
 
-    def add_not_finite(self, row: Row, column: int) -> None:
+    def add_not_finite(self, row: BadRow, column: int) -> None:
         """A cell is a NaN, which is told beside others that are bad."""
         self._not_finite.append((row, column))
 
@@ -73,7 +73,7 @@ class BadCells:
         """So many rows have no bad cell."""
         self._rows += count
 
-    def end_row(self, row: Row, read: Sequence[int]) -> None:
+    def end_row(self, row: BadRow, read: Sequence[int]) -> None:
         """All cells of a row were looked at."""
         if self._bad_here:
             self._bad_rows.append((self._rows, row, self._bad_here < len(read)))
@@ -120,7 +120,7 @@ class BadCells:
             "their rows, or state header_line, delimiter or decimal in the map"
         )
 
-    def _cell_reason(self, row: Row, column: int) -> str:
+    def _cell_reason(self, row: BadRow, column: int) -> str:
         cell = row.cell(column)
         what = f"{cell!r} is not" if cell else "is empty"
         return f"line {row.line}, column '{self._names[column]}': {what}"

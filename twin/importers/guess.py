@@ -23,11 +23,11 @@ from twin.importers.proposal.courses import columns_of
 from twin.importers.proposal.forces import exchanged, with_force
 from twin.importers.proposal.names import names_of, unit_of
 from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
-from twin.importers.proposal.signals import Axis, File
+from twin.importers.proposal.signals import File, ProposedAxis
 from twin.importers.proposal.text import (
     PER_ONE,
     Answers,
-    Entry,
+    MapEntry,
     Need,
     entries_of,
     lines_of,
@@ -82,7 +82,7 @@ class Proposal:
 
     name: str
     file: File
-    axes: tuple[Axis, ...]
+    axes: tuple[ProposedAxis, ...]
     head: tuple[str, ...]
     tail: tuple[str, ...]
     holes: Mapping[str, str]
@@ -121,7 +121,7 @@ class Proposal:
         of_none = [c for c in self.file.columns if c not in known]
         return [*rows, *(self._row(None, c, None) for c in of_none)]
 
-    def _row(self, axis: Axis | None, column: str, entry: Entry | None) -> ColumnRow:
+    def _row(self, axis: ProposedAxis | None, column: str, entry: MapEntry | None) -> ColumnRow:
         values, unit = self.file.columns[column], self.file.names[column].unit
         low, high = float(values.values.min()), float(values.values.max())
         if axis is None or entry is None:
@@ -162,9 +162,9 @@ def propose(path: Path) -> Proposal:
     return Proposal(path.name, file, axes, (head, *stated.lines), tail, missing, stated.missing)
 
 
-def _axis(file: File, name: str, columns: Sequence[str]) -> Axis:
+def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
     """What is proposed for an axis of these columns."""
-    axis = with_position(file, Axis(name, tuple(columns)))
+    axis = with_position(file, ProposedAxis(name, tuple(columns)))
     if (position := axis.signals.get("position")) is not None:
         axis = replace(axis, comes_round=file.column(position.name).wraps is not None)
     if "position" not in axis.signals:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.importers.bad_cells import BadCells, Row
+from twin.importers.bad_cells import BadCells, BadRow
 from twin.importers.mapping import ImportMap
 from twin.importers.proposal.lexicon import words_of_the_far_east
 from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
@@ -335,12 +335,12 @@ class _Rows:
             if self._header is not None and cells == self._header:
                 self.bad.add_header(number)
                 continue
-            row = Row(number, line, cells)
+            row = BadRow(number, line, cells)
             read.append(tuple(self._value(row, k) for k in self._where))
             self.bad.end_row(row, self._where)
         return np.array(read, self._type)
 
-    def _value(self, row: Row, place: int) -> float:
+    def _value(self, row: BadRow, place: int) -> float:
         cell, stamps = row.cell(place), self.stamps.get(place)
         try:
             value = self._layout.style.value(cell) if stamps is None else stamps.add(cell)

@@ -52,7 +52,7 @@ LAWS = (
 
 
 @dataclass(frozen=True)
-class Outcome:
+class LawOutcome:
     """A law put to an effect. holds: None where it was not tried; fault: why not, one sentence."""
 
     law: str
@@ -65,7 +65,7 @@ class LawReport:
     """What each law made of one effect."""
 
     effect: str
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[LawOutcome, ...]
 
     @property
     def ok(self) -> bool:
@@ -79,22 +79,22 @@ def check_effect(effect: Effect) -> LawReport:
     A broken law is part of the report and raises nothing. Where the effect uses what it has not
     declared, nothing else is tried: compiled, it would write anywhere.
     """
-    outcomes: list[Outcome] = []
+    outcomes: list[LawOutcome] = []
     for law in (law for law in LAWS if effect.kind in law.kinds):
         if outcomes and outcomes[0].holds is False:
-            outcomes.append(Outcome(law.says, None, "not tried before the first law holds"))
+            outcomes.append(LawOutcome(law.says, None, "not tried before the first law holds"))
         else:
             outcomes.append(_tried(law, effect))
     return LawReport(effect.name, tuple(outcomes))
 
 
-def _tried(law: Law, effect: Effect) -> Outcome:
+def _tried(law: Law, effect: Effect) -> LawOutcome:
     try:
         with np.errstate(all="ignore"):
             law.check(effect)
     except LawBroken as broken:
-        return Outcome(law.says, False, str(broken))
+        return LawOutcome(law.says, False, str(broken))
     except (ArithmeticError, ValueError) as error:  # of the law, run as plain Python
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return Outcome(law.says, False, f"its law fails as plain Python: {reason}")
-    return Outcome(law.says, True)
+        return LawOutcome(law.says, False, f"its law fails as plain Python: {reason}")
+    return LawOutcome(law.says, True)

@@ -19,7 +19,7 @@ from twin.logs.log import Array, AxisLog, Log
 from twin.logs.topics import (
     AXIS_PREFIX,
     TRUTH_PREFIX,
-    Block,
+    MessageBlock,
     Series,
     Topic,
     Topics,
@@ -83,7 +83,7 @@ def read_log(
             everything = wanted == EVERYTHING
             records = file.records() if everything else file.selected(wanted.channels(file))
             return next(log_parts(file, records, wanted, None))
-        run = Run(file, wanted)
+        run = Decoding(file, wanted)
         span = round(first * 1e9), min(last * 1e9, 2.0**63)
         for _ in run.fed(file.selected(wanted.channels(file), *span)):
             pass
@@ -145,7 +145,7 @@ def log_parts(
     file: McapFile, records: Iterator[Record], wanted: Wanted, samples: int | None
 ) -> Iterator[Log]:
     """The log in parts of ``samples`` or a few more; whole where None."""
-    run, told = Run(file, wanted, samples), False
+    run, told = Decoding(file, wanted, samples), False
     for _ in run.fed(records):
         if samples is not None and run.holds(samples):
             yield run.log()
@@ -197,7 +197,7 @@ def checksum(metadata: Mapping[str, str]) -> str:
     return f"{crc:08x}"
 
 
-class Run:
+class Decoding:
     """The samples of a file as they arrive, of a topic so many at once (None: all), and extras."""
 
     def __init__(self, file: McapFile, wanted: Wanted, samples: int | None = None) -> None:
@@ -238,7 +238,7 @@ class Run:
             else:
                 self._extras.add(record)
 
-    def _open(self, block: Block) -> Series | None:
+    def _open(self, block: MessageBlock) -> Series | None:
         topic = self._topics.topic(block.channel)
         if topic is None or not self._wanted.takes(topic.name):
             return None

@@ -23,7 +23,7 @@ from twin.logs.container import (
 )
 from twin.logs.decode import Extras, assembled
 from twin.logs.log import Array, Log
-from twin.logs.topics import Block, Series, Topic, Topics
+from twin.logs.topics import MessageBlock, Series, Topic, Topics
 
 LARGEST_RECORD = 1 << 28  # bytes; a length beyond is none
 
@@ -71,7 +71,7 @@ class Incoming:
         """Hold nothing of what was there."""
         self._held.clear()
 
-    def _append(self, block: Block) -> None:
+    def _append(self, block: MessageBlock) -> None:
         topic = self.topics.topic(block.channel)
         if topic is None or topic.is_truth:
             return

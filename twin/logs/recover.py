@@ -45,7 +45,7 @@ from twin.logs.container import (
 from twin.logs.decode import EVERYTHING, Extras, assembled, common_rate, log_parts
 from twin.logs.log import Array, Log, joined
 from twin.logs.topics import (
-    Block,
+    MessageBlock,
     Topic,
     Topics,
     require_even,
@@ -240,7 +240,7 @@ class _Stretch:
         nothing = ((topic, {name: np.empty(0) for name in topic.fields}) for topic in topics)
         return assembled(nothing, common_rate(topics, extras), extras)
 
-    def logs(self, extras: Extras, read: Callable[[_Piece], Block]) -> Iterator[Log]:
+    def logs(self, extras: Extras, read: Callable[[_Piece], MessageBlock]) -> Iterator[Log]:
         """Its samples as logs that follow each other; raises InputError as ``empty`` does."""
         rate, every = self.empty(extras).sample_rate, self.pieces.values()
         step = 1 << 15  # the same of a damaged one, whose chunks are held beside them
@@ -251,7 +251,7 @@ class _Stretch:
 
 
 def _columns(
-    pieces: Sequence[_Piece], first: int, stop: int, read: Callable[[_Piece], Block]
+    pieces: Sequence[_Piece], first: int, stop: int, read: Callable[[_Piece], MessageBlock]
 ) -> dict[str, Array]:
     """Samples number ``first`` to before ``stop`` of one topic."""
     found: dict[str, list[Array]] = {name: [] for name in pieces[0].topic.fields}
@@ -316,7 +316,7 @@ class _Salvage:
 
         return str(stretch), logs
 
-    def _block(self, piece: _Piece) -> Block:
+    def _block(self, piece: _Piece) -> MessageBlock:
         """The samples of a piece, read from the file again."""
         blocks = self._topics.blocks(self._content(piece.chunk))
         return next(block for block in blocks if block.channel == piece.topic.layout.channel)

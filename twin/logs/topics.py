@@ -112,7 +112,7 @@ def sample_times(first: int, count: int, sample_rate: float) -> NDArray[np.int64
 
 
 @dataclass(frozen=True)
-class Block:
+class MessageBlock:
     """Consecutive samples of one channel: sequence, log_time (ns) and columns by name, (n,)."""
 
     channel: int
@@ -152,7 +152,9 @@ class MessageLayout:
         return record
 
 
-def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> list[Block] | None:
+def blocks_of(
+    layouts: Sequence[MessageLayout], data: bytes, offset: int
+) -> list[MessageBlock] | None:
     """The samples from ``offset`` on, as views; None unless they are rows of every channel."""
     row = np.dtype([(str(layout.channel), layout.dtype) for layout in layouts])
     count, rest = divmod(len(data) - offset, row.itemsize)
@@ -166,7 +168,9 @@ def blocks_of(layouts: Sequence[MessageLayout], data: bytes, offset: int) -> lis
         if not all((records[name] == layout.template[name]).all() for name in fixed):
             return None
         columns = {name: records[name] for name in layout.numbers}
-        blocks.append(Block(layout.channel, records[".sequence"], records[".log_time"], columns))
+        blocks.append(
+            MessageBlock(layout.channel, records[".sequence"], records[".log_time"], columns)
+        )
     return blocks
 
 
@@ -303,7 +307,7 @@ class Topics:
         self._topics[channel] = topic
         return topic
 
-    def blocks(self, data: bytes) -> list[Block]:
+    def blocks(self, data: bytes) -> list[MessageBlock]:
         """Samples of a chunk by channel; raises InputError, Damaged for broken framing.
 
         The messages of a chunk must all be laid out as the first ones, as this program writes them.
@@ -395,7 +399,7 @@ class Series:
         first = round(self.start * 1e-9 * self.rate)
         return range(first, first + self.count)
 
-    def append(self, block: Block) -> None:
+    def append(self, block: MessageBlock) -> None:
         """Take the next samples; raises InputError for a gap, a NaN or a time out of place."""
         if self.count == 0:
             self.start = int(block.log_time[0])
@@ -424,7 +428,7 @@ class Series:
         return columns
 
 
-def require_even(topic: Topic, block: Block, sequence: int, start: int, count: int) -> None:
+def require_even(topic: Topic, block: MessageBlock, sequence: int, start: int, count: int) -> None:
     """Raise InputError where samples of a topic are not those behind ``count`` others.
 
     sequence: number that their first must have; start: time of the topic's first sample in ns.
@@ -461,7 +465,7 @@ def require_even(topic: Topic, block: Block, sequence: int, start: int, count: i
         )
 
 
-def require_finite(topic: Topic, block: Block, name: str, count: int) -> None:
+def require_finite(topic: Topic, block: MessageBlock, name: str, count: int) -> None:
     """Raise InputError where a column of the samples behind ``count`` others is not a number."""
     column = block.columns[name]
     if (i := first_not_finite(column)) is not None:

@@ -60,7 +60,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Signals:
+class TopicSignals:
     """One topic to be written: numbers gives field -> protobuf number, in the order written."""
 
     topic: str
@@ -90,7 +90,7 @@ class Outline:
 
     @classmethod
     def of(
-        cls, topics: Iterable[Signals], sample_rate: float, metadata: Mapping[str, str],
+        cls, topics: Iterable[TopicSignals], sample_rate: float, metadata: Mapping[str, str],
         attachments: Mapping[str, bytes],
     ) -> Outline:  # fmt: skip
         """The file of these topics; equal schemas are written once."""
@@ -125,7 +125,7 @@ def outline_of(log: Log) -> Outline:
     return Outline.of(signals_of(log), log.sample_rate, {**given, **own}, log.attachments)
 
 
-def signals_of(log: Log) -> Iterator[Signals]:
+def signals_of(log: Log) -> Iterator[TopicSignals]:
     """The topics of a log, or of a part of one; raises InputError where an axis lacks anything."""
     rate = {"sample_rate_hz": repr(float(log.sample_rate))}
     for name, axis in log.axes.items():
@@ -138,12 +138,12 @@ def signals_of(log: Log) -> Iterator[Signals]:
         metadata = {"axis": name, **rate, **known}
         if axis.force_constant is not None:
             metadata["force_constant"] = repr(float(axis.force_constant))
-        yield Signals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
+        yield TopicSignals(topic, AXIS_SAMPLE, axis.columns, numbers, metadata)
     for name, columns in log.truth.items():
         units = complete_units(log.axes[name].units) if name in log.axes else {}
         known = {f"unit.{c}": units[c] for c in _TRUTH_UNITS if c in columns and c in units}
         metadata = {"axis": name, **rate, **known}
-        yield Signals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
+        yield TopicSignals(TRUTH_PREFIX + name, AXIS_TRUTH, columns, numbered(columns), metadata)
 
 
 def _check_axis(axis: AxisLog) -> None:
@@ -159,7 +159,7 @@ def _check_axis(axis: AxisLog) -> None:
         raise InputError(f"force constant is {constant} {axis.kind('N/A')}; give a number above 0")
 
 
-def _require_samples(signals: Signals, count: int, sample_rate: float, first: int) -> None:
+def _require_samples(signals: TopicSignals, count: int, sample_rate: float, first: int) -> None:
     """Raise InputError where a column is not a number for each of the samples from ``first`` on."""
     for name, column in signals.columns.items():
         if not IDENTIFIER.fullmatch(name):
@@ -224,10 +224,12 @@ def write_topics(
     """
     rate = {"sample_rate_hz": repr(float(sample_rate))}
 
-    def series(log: Log) -> Iterator[Signals]:
+    def series(log: Log) -> Iterator[TopicSignals]:
         for topic, axis in log.axes.items():
             known = {f"unit.{c}": u for c in axis.columns if (u := units.get(f"{topic}/{c}"))}
-            yield Signals(topic, SERIES, axis.columns, numbered(axis.columns), {**rate, **known})
+            yield TopicSignals(
+                topic, SERIES, axis.columns, numbered(axis.columns), {**rate, **known}
+            )
 
     log = Log(sample_rate, {topic: AxisLog(columns) for topic, columns in topics.items()})
     outline = Outline.of(series(log), sample_rate, {"source": "comparison"}, {})
@@ -235,7 +237,7 @@ def write_topics(
         _written(stream, outline, series, [log], CHUNK_BYTES)
 
 
-Topics = Callable[[Log], Iterable[Signals]]
+Topics = Callable[[Log], Iterable[TopicSignals]]
 """The topics of a part of a log, always the same ones in the same order."""
 _Stretch = tuple[Planned, int, Mapping[str, Array]]  # a topic, the number of its first sample
 

@@ -19,7 +19,7 @@ from twin.errors import InputError, at
 from twin.files import write_atomically
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import all_parameters, read
-from twin.model.schema import AxisEntry, EffectEntry, ModelFile
+from twin.model.schema import AxisEntry, EffectTable, ModelFile
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def _units(entry: AxisEntry) -> AxisUnits:
     return kinds[0]
 
 
-def _fitted(effect: Effect, entry: EffectEntry, units: AxisUnits) -> Fitted:
+def _fitted(effect: Effect, entry: EffectTable, units: AxisUnits) -> Fitted:
     fitted = Fitted.at_start(effect, entry.model_extra, units)
     if entry.fixed is None:
         return fitted

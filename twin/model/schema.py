@@ -75,7 +75,7 @@ def _with_hardware(kind: type[Entries]) -> type[Entries]:
     return create_model(kind.__name__, __base__=kind, __module__=__name__, **given)
 
 
-class EffectEntry(Entries):
+class EffectTable(Entries):
     """Parameters by name; each number is checked against the effect's own bounds."""
 
     model_config = ConfigDict(extra="allow")
@@ -110,7 +110,7 @@ class AxisEntry(_MovedEntry):
     channel_delay: float | None = _quantity(
         "s", "by which the force is stamped later than it acts", zero=True, most=1.0
     )
-    effects: dict[str, EffectEntry] = Field(
+    effects: dict[str, EffectTable] = Field(
         {}, description="a table for each effect, as in [axes.x.effects.cogging]"
     )
 

@@ -263,7 +263,7 @@ def _callback(off: Offsets) -> Any:
     return callback(passive, types.void(types.int64, types.int64))
 
 
-class Driven(NamedTuple):
+class DrivenAxis(NamedTuple):
     """An axis in a spec: its joint or fixed tendon, its motor, and the mass (kg) of its friction.
 
     rotor: kg, of its own inertia beside the bodies of a mechanism; below 0 on a plain axis.
@@ -309,7 +309,9 @@ class Attached(NamedTuple):
     parts: Array
 
 
-def attach(spec: mujoco.MjSpec, table: Table, period: float, axes: Sequence[Driven]) -> Attached:
+def attach(
+    spec: mujoco.MjSpec, table: Table, period: float, axes: Sequence[DrivenAxis]
+) -> Attached:
     """Write the table into the spec; axes: in the table's order."""
     model = spec.compile()
     own = [parts_of(model, axis.joint) for axis in axes]

@@ -19,7 +19,7 @@ from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import (
     USER_HEADER,
-    Driven,
+    DrivenAxis,
     attach,
     native_address,
     offsets,
@@ -94,7 +94,7 @@ class MujocoSimulator:
         else:
             spec = machine_spec(model)
             pairs = zip(model.axes, table.masses, strict=True)
-            axes = [Driven(a, f"motor_{a}", mass) for a, mass in pairs]
+            axes = [DrivenAxis(a, f"motor_{a}", mass) for a, mass in pairs]
         self._own = attach(spec, table, model.period, axes)
         # A bad state stays bad, and is found, instead of starting again from zero.
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET

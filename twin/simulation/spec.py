@@ -16,7 +16,7 @@ from twin.errors import CannotRun, InputError
 from twin.model.bodies import mechanism_in
 from twin.model.machine import MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits
-from twin.mujoco.callback import Driven
+from twin.mujoco.callback import DrivenAxis
 from twin.mujoco.mechanism import strip_passive
 from twin.mujoco.reading import read_bodies, read_spec
 
@@ -303,7 +303,7 @@ def jointed_spec(model: MachineModel) -> mujoco.MjSpec:
     return spec
 
 
-def driven(model: MachineModel) -> list[Driven]:
+def driven(model: MachineModel) -> list[DrivenAxis]:
     """The axes of such a spec.
 
     Friction stops a joint by the least inertia that it may have: more than it has would throw it
@@ -311,6 +311,6 @@ def driven(model: MachineModel) -> list[Driven]:
     """
     found = mechanism_in(model)
     return [
-        Driven(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
+        DrivenAxis(axis.joint or name, f"motor_{name}", float(least), axis.weighed.mass - axis.mass)
         for (name, axis), least in zip(model.axes.items(), found.freed, strict=True)
     ]

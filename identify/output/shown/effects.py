@@ -14,7 +14,7 @@ from identify.output.blocks import (
     Facts,
     Heading,
     Ink,
-    Line,
+    LineStyle,
     Listing,
     Row,
     TableBlock,
@@ -113,10 +113,10 @@ def shape_charts(shape: FoundShape) -> list[Chart]:
             (label, along(shape.coordinate)),
             scale.label(words(f"Force of the law, {direction}")),
             [
-                Drawn("90 % band", scale(curve.found - curve.band_90), Line.BAND),
-                Drawn("90 % band", scale(curve.found + curve.band_90), Line.BAND),
+                Drawn("90 % band", scale(curve.found - curve.band_90), LineStyle.BAND),
+                Drawn("90 % band", scale(curve.found + curve.band_90), LineStyle.BAND),
                 Drawn("found in the logs", scale(curve.found)),
-                Drawn("assumed by the law", scale(curve.assumed), Line.DASH, Ink.INK),
+                Drawn("assumed by the law", scale(curve.assumed), LineStyle.DASH, Ink.INK),
             ],
         )
         for direction, curve in shape.curves.items()

@@ -14,7 +14,7 @@ from identify.output.blocks import (
     Chart,
     Drawn,
     Ink,
-    Line,
+    LineStyle,
     Listing,
     TableBlock,
     Tile,
@@ -191,13 +191,13 @@ def _lines(course: Course, alarms: Sequence[Alarm]) -> list[Drawn]:
     if np.isfinite(within).any() and np.nanmax(within) > 0.0:
         edges = {"high": course.values + within, "low": course.values - within}
         lines += [
-            Drawn(f"90 % band within the log, {end} end", scale(edge), Line.BAND)
+            Drawn(f"90 % band within the log, {end} end", scale(edge), LineStyle.BAND)
             for end, edge in edges.items()
         ]
     lines.append(Drawn("as fitted", scale(course.values), ink=Ink.SOFT))
     if not np.array_equal(course.alone, course.values, equal_nan=True):
         lines.append(Drawn("less what all machines do", scale(course.alone)))
-    lines.append(Drawn("median of its kind", scale(course.usual), Line.DASH, Ink.SOFT))
+    lines.append(Drawn("median of its kind", scale(course.usual), LineStyle.DASH, Ink.SOFT))
     for alarm in alarms:
         changed = (alarm.changed - date(1970, 1, 1)).days
         level = np.where(course.days < changed, alarm.before, alarm.after)

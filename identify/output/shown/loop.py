@@ -12,7 +12,7 @@ from identify.output.blocks import (
     Chart,
     Drawn,
     Ink,
-    Line,
+    LineStyle,
     Listing,
     Row,
     TableBlock,
@@ -45,7 +45,11 @@ def _bode(found: AxisFrequency, logs: Sequence[str]) -> list[Chart]:
         plant = np.where(response.tells, response.plant, np.nan)[told]
         size, half = np.abs(plant), response.band[told]
         low, high = np.maximum(size - half, 1e-3 * size), size + half
-        curves = ((band, low, Line.BAND), (band, high, Line.BAND), (name, size, Line.LINE))
+        curves = (
+            (band, low, LineStyle.BAND),
+            (band, high, LineStyle.BAND),
+            (name, size, LineStyle.LINE),
+        )
         sizes += [Drawn(label, 20.0 * np.log10(curve), line, ink) for label, curve, line in curves]
         phases.append(Drawn(name, np.degrees(np.angle(plant)) % -360.0, ink=ink))
     caption = (

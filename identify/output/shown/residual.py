@@ -12,7 +12,7 @@ from identify.output.blocks import (
     Chart,
     Drawn,
     Ink,
-    Line,
+    LineStyle,
     Listing,
     Row,
     TableBlock,
@@ -103,8 +103,8 @@ def spectrum_chart(one: MisfitMap, units: AxisUnits) -> Chart:
         scale(np.where(values > 0.0, values, np.nan)[[*range(len(values)), -1]]) for values in shown
     )
     lines = [
-        Drawn(units.words("force error"), error, Line.STEPS),
-        Drawn("noise", noise, Line.STEPS, Ink.SOFT),
+        Drawn(units.words("force error"), error, LineStyle.STEPS),
+        Drawn("noise", noise, LineStyle.STEPS, Ink.SOFT),
     ]
     caption = "RMS error in bands of half an octave, independent of the test function."
     label = scale.label(units.words("RMS force error"))
@@ -142,8 +142,8 @@ def _histogram(tests: ResidualTests, units: AxisUnits) -> Chart:
     bins = density[np.searchsorted(edges, at, side="right") - 1]
     normal = np.exp(-0.5 * (at / floor) ** 2) / (np.sqrt(2.0 * np.pi) * floor)
     lines = [
-        Drawn("residual", bins, Line.STEPS),
-        Drawn("normal, of the noise floor", normal, Line.LINE, Ink.AFTER),
+        Drawn("residual", bins, LineStyle.STEPS),
+        Drawn("normal, of the noise floor", normal, LineStyle.LINE, Ink.AFTER),
     ]
     caption = f"The force residual on {tests.samples} test functions that do not overlap."
     along = (scale.label(units.words("Force residual")), at)
@@ -154,10 +154,10 @@ def _correlation(test: Correlation) -> Chart:
     scale, own = DisplayUnit.of("s", test.lag), test.signal == "residual"
     bound = np.full(len(test.lag), test.bound_90)
     lines = [
-        Drawn("tested", np.where(test.tested, test.value, np.nan), Line.STEMS),
-        Drawn("not tested", np.where(test.tested, np.nan, test.value), Line.STEMS, Ink.SOFT),
-        Drawn("90 % bound", bound, Line.DASH, Ink.INK),
-        Drawn("90 % bound", -bound, Line.DASH, Ink.INK),
+        Drawn("tested", np.where(test.tested, test.value, np.nan), LineStyle.STEMS),
+        Drawn("not tested", np.where(test.tested, np.nan, test.value), LineStyle.STEMS, Ink.SOFT),
+        Drawn("90 % bound", bound, LineStyle.DASH, Ink.INK),
+        Drawn("90 % bound", -bound, LineStyle.DASH, Ink.INK),
     ]
     lag = "Lag" if own else f"Lag, {test.signal} first where positive"
     name = "Autocorrelation (1)" if own else f"Correlation with {test.signal} (1)"

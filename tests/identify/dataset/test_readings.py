@@ -26,7 +26,7 @@ from identify.dataset.readings import (
     ripples_of_widest,
     together,
 )
-from identify.dataset.spectrum import MOST_LINES, Record, find_lines, lines_in_time
+from identify.dataset.spectrum import MOST_LINES, ScatteredSignal, find_lines, lines_in_time
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue
@@ -255,7 +255,7 @@ def test_noise_of_any_colour_shows_a_line_as_rarely_as_is_said(records, pole):
     rng, told = np.random.default_rng(3), 0
     for _ in range(100):
         noise = lfilter([1.0], [1.0, -pole], rng.normal(size=(records, 1500)))
-        parts = [Record(np.arange(1500.0), n) for n in noise]
+        parts = [ScatteredSignal(np.arange(1500.0), n) for n in noise]
         told += bool(find_lines(parts, 2.0 / 1500, 0.4, chance=0.1, most=1))
     assert told <= 20
 
@@ -266,19 +266,19 @@ def test_a_line_has_its_frequency_share_and_a_small_false_alarm(spacing):
     x = np.linspace(-0.05, 0.1, 3000) if spacing == "even" else rng.uniform(-0.05, 0.1, 3000)
     for frequency in (171.3, 1733.0):
         values = 0.5 * np.sin(2.0 * np.pi * frequency * x + 0.7) + rng.normal(0.0, 0.3, 3000)
-        first, *others = find_lines([Record(x, 1e3 * values + 7.0)], 10.0 / 0.15, 5000.0)
+        first, *others = find_lines([ScatteredSignal(x, 1e3 * values + 7.0)], 10.0 / 0.15, 5000.0)
         assert first.frequency == pytest.approx(frequency, abs=0.1 / 0.15)
         assert first.share == pytest.approx(0.125 / (0.125 + 0.09), abs=0.04)
         assert first.false_alarm < 1e-12
         assert all(o.false_alarm > 1e-6 for o in others)
-    assert find_lines([Record(x, 0.0 * x)], 10.0, 5000.0) == ()
-    assert find_lines([Record(0.0 * x, values)], 10.0, 5000.0) == ()
+    assert find_lines([ScatteredSignal(x, 0.0 * x)], 10.0, 5000.0) == ()
+    assert find_lines([ScatteredSignal(0.0 * x, values)], 10.0, 5000.0) == ()
 
 
 def test_records_share_a_line_whatever_its_phase_in_each():
     rng, t = np.random.default_rng(12), np.arange(2000.0)
     parts = [
-        Record(t, 0.13 * np.sin(2.0 * np.pi * 0.0817 * t + k) + rng.normal(size=2000))
+        ScatteredSignal(t, 0.13 * np.sin(2.0 * np.pi * 0.0817 * t + k) + rng.normal(size=2000))
         for k in range(5)
     ]
     alone = [find_lines([p], 1e-3, 0.4, chance=1e-3, most=1) for p in parts]

@@ -16,7 +16,7 @@ from scipy.signal import butter, lfilter
 import identify
 from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
 from identify.frequency.plant import Banded, loop_of, plant_of
-from identify.frequency.response import Record, response
+from identify.frequency.response import LoopSignals, response
 from identify.output.as_json import answer_of
 from tests.cli_runs import refusal, twin
 from twin.effects import Catalogue, load_catalogue
@@ -32,7 +32,7 @@ MACHINE = TwoMasses()
 Setpoint = Callable[[int, np.random.Generator], Array]
 
 
-def recorded(setpoint: Setpoint, machine: TwoMasses = MACHINE, seed: int = 1) -> Record:
+def recorded(setpoint: Setpoint, machine: TwoMasses = MACHINE, seed: int = 1) -> LoopSignals:
     rng = np.random.default_rng(seed)
     return machine.run(setpoint(SAMPLES, rng), rng)
 

@@ -56,8 +56,11 @@ def lost(**changes: object):
 
 
 def laws() -> Answer:
-    held = verdict.Outcome("law 0", True, "")
-    failed, untried = verdict.Outcome("law 1", False, "off"), verdict.Outcome("law 2", None, "x")
+    held = verdict.LawOutcome("law 0", True, "")
+    failed, untried = (
+        verdict.LawOutcome("law 1", False, "off"),
+        verdict.LawOutcome("law 2", None, "x"),
+    )
     reports = verdict.LawReport("a", (held,)), verdict.LawReport("b", (failed, untried))
     assert laws_answer(reports[:1]).ok
     return laws_answer(reports)

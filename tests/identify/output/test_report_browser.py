@@ -14,7 +14,7 @@ from browser import Browser, browser
 from report_cases import Case
 
 from identify import workflow
-from identify.output.blocks import Chart, Drawn, Line
+from identify.output.blocks import Chart, Drawn, LineStyle
 from identify.output.report.page import Section
 from identify.output.report.page import page as whole_page
 from twin.effects import Catalogue, load_catalogue
@@ -164,7 +164,7 @@ def test_a_band_has_one_entry_and_small_values_a_scale(shown: tuple[Browser, Pat
     """Beside each band its name stood twice, and below 0.001 the scale said 0."""
     running, file = shown
     along, size = np.array([1.0, 10.0, 100.0]), np.array([1e-5, 1e-4, 1e-3])
-    edges = [Drawn("band", factor * size, Line.BAND) for factor in (0.5, 2.0)]
+    edges = [Drawn("band", factor * size, LineStyle.BAND) for factor in (0.5, 2.0)]
     chart = Chart(("f (Hz)", along), "F (N)", [*edges, Drawn("F", size)], log_x=True, log_y=True)
     text = whole_page("bands", (), [Section("one", "One", [chart])], (), ())
     (file.parent / "bands.html").write_text(text, encoding="utf-8")

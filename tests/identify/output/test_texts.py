@@ -141,7 +141,7 @@ DRAG, WITH_LUGRE = step(made.RIVAL), step(made.LATER)
 WEAR = replace(made.addition(), step=made.STEPS[2])
 STRANGE = replace(made.TRIALS[1], gain=91.0)
 IMPOSSIBLE = replace(made.TRIALS[1], gain=0.0, not_run=NotRun(made.TRIALS[1].experiment, "too far"))
-LAW = verdict.Outcome("law 0", True, "")
+LAW = verdict.LawOutcome("law 0", True, "")
 LAWS = [
     verdict.LawReport("a", (LAW,)),
     verdict.LawReport(

@@ -2,13 +2,13 @@
 
 import pytest
 
-from twin.importers.proposal.lexicon import Quantity, Role
+from twin.importers.proposal.lexicon import Quantity, SignalRole
 from twin.importers.proposal.names import names_of, words_of
 
 SHORT = {
     "p": Quantity.POSITION, "v": Quantity.VELOCITY, "a": Quantity.ACCELERATION,
     "f": Quantity.FORCE, "i": Quantity.CURRENT, "d": Quantity.DRIVE, "-": Quantity.OTHER,
-    "?": None, "m": Role.MEASURED, "r": Role.ASKED, "c": Role.PART,
+    "?": None, "m": SignalRole.MEASURED, "r": SignalRole.ASKED, "c": SignalRole.PART,
 }  # fmt: skip
 
 # quantity, and role where there is one; unit; axis; name

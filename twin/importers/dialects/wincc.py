@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError
-from twin.importers.bad_cells import BadCells, Row
+from twin.importers.bad_cells import BadCells, BadRow
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.stamps import Stamps
@@ -71,7 +71,7 @@ def _logged(path: Path) -> tuple[dict[str, tuple[NDArray, NDArray]], int]:
             if cells[valid].strip() != "1":
                 invalid += 1
                 continue
-            row = Row(rows.line_num, delimiter.join(cells), cells)
+            row = BadRow(rows.line_num, delimiter.join(cells), cells)
             times, values = found.setdefault(cells[variable], ([], []))
             for k, out, read in ((clock.column, times, clock.read), (value, values, _number)):
                 try:

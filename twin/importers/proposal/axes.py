@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from twin.importers.proposal.courses import Column
-from twin.importers.proposal.lexicon import Quantity, Role
+from twin.importers.proposal.courses import TableColumn
+from twin.importers.proposal.lexicon import Quantity, SignalRole
 from twin.importers.proposal.motion import explained
 from twin.importers.proposal.names import AXIS_LETTERS, Name
 from twin.logs.topics import IDENTIFIER
@@ -18,15 +18,15 @@ PLAIN = "x"  # an axis that no name tells
 
 def is_position(name: Name) -> bool:
     """Whether a name says that it is a measured position."""
-    return name.quantity is Quantity.POSITION and name.role is not Role.ASKED
+    return name.quantity is Quantity.POSITION and name.role is not SignalRole.ASKED
 
 
 def is_drive(name: Name) -> bool:
     """Whether a name says that it is a force or a current."""
-    return name.quantity in DRIVING and name.role is not Role.PART
+    return name.quantity in DRIVING and name.role is not SignalRole.PART
 
 
-def axes_of(names: Mapping[str, Name], columns: Mapping[str, Column]) -> dict[str, list[str]]:
+def axes_of(names: Mapping[str, Name], columns: Mapping[str, TableColumn]) -> dict[str, list[str]]:
     """Axis -> its columns, and those that no name gives to another axis.
 
     A word tells axes apart where a position and a force, or a current, have it.
@@ -80,7 +80,9 @@ def _named(keys: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
     return out
 
 
-def _by_physics(names: Mapping[str, Name], columns: Mapping[str, Column]) -> dict[str, list[str]]:
+def _by_physics(
+    names: Mapping[str, Name], columns: Mapping[str, TableColumn]
+) -> dict[str, list[str]]:
     """Axes of two and more positions and forces whose names do not go together."""
     positions = [c for c, n in names.items() if is_position(n) and n.sure]
     drives = [c for c, n in names.items() if is_drive(n)]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.importers.proposal.courses import Column
-from twin.importers.proposal.lexicon import Quantity, Role
+from twin.importers.proposal.courses import TableColumn
+from twin.importers.proposal.lexicon import Quantity, SignalRole
 from twin.importers.proposal.names import Name
-from twin.importers.proposal.signals import Axis, Certainty, File, Signal
+from twin.importers.proposal.signals import Certainty, File, ProposedAxis, Signal
 
 FIELDS = {
     Quantity.PRESSURE: ("pressure", "pressure_2"),
@@ -16,7 +16,7 @@ FIELDS = {
 SI = {"pressure": "Pa", "pressure_2": "Pa", "temperature": "K"}
 
 
-def with_channels(file: File, axis: Axis) -> Axis:
+def with_channels(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with the pressures and the temperature that names tell, as many as a log holds."""
     for quantity, fields in FIELDS.items():
         measured = [n for n in file.some(axis.free, quantity) if _is_measured(n)]
@@ -28,10 +28,10 @@ def with_channels(file: File, axis: Axis) -> Axis:
 
 
 def _is_measured(name: Name) -> bool:
-    return name.role not in (Role.ASKED, Role.PART)
+    return name.role not in (SignalRole.ASKED, SignalRole.PART)
 
 
-def channel_unit(signal: Signal, column: Column) -> tuple[str, bool]:
+def channel_unit(signal: Signal, column: TableColumn) -> tuple[str, bool]:
     """The unit of a pressure or temperature, and whether its name states it."""
     if signal.name.unit is not None:
         return signal.name.unit, True

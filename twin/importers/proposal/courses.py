@@ -22,7 +22,7 @@ ENOUGH = 50_000  # rows that tell what the noise of a column is
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column (n,) and what is asked of it again and again."""
 
     name: str
@@ -106,7 +106,7 @@ class Column:
         size = float(np.std(ripple))
         return size / self.spread, size > 0.0 and likeness(ripple[1:], ripple[:-1]) < -0.5
 
-    def rate(self, other: Column, samples: int) -> tuple[float, float]:
+    def rate(self, other: TableColumn, samples: int) -> tuple[float, float]:
         """How well a column goes with the rate of this one, 0 to 1, and one of it in that rate.
 
         The rate is that of a row. samples: rows over which both are averaged. A rate is 0 at rest,
@@ -124,14 +124,14 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Course:
+class ColumnCourse:
     """A column beside a position, of its course.
 
     slope: how much of it is one of the position, negative where it is reversed. behind: samples by
     which the position follows it. likeness: their correlation then.
     """
 
-    column: Column
+    column: TableColumn
     slope: float
     behind: float
     likeness: float
@@ -144,7 +144,7 @@ def likeness(a: Array, b: Array) -> float:
     return float(a @ b) / size if size > 0.0 else 0.0
 
 
-def course(position: Column, other: Column) -> Course | None:
+def course(position: TableColumn, other: TableColumn) -> ColumnCourse | None:
     """Another column as one of the course of a position; None where it goes elsewhere."""
     own, its = position.short, other.short
     loop = min(len(own) // 8, 512)  # samples, by which a loop follows at all
@@ -159,10 +159,12 @@ def course(position: Column, other: Column) -> Course | None:
     if abs(near[at]) < ALIKE:
         return None
     slope = float(np.sign(near[at])) * other.spread / position.spread
-    return Course(other, slope, _lag(position, other) * position.samples, float(abs(near[at])))
+    return ColumnCourse(
+        other, slope, _lag(position, other) * position.samples, float(abs(near[at]))
+    )
 
 
-def _lag(position: Column, setpoint: Column) -> float:
+def _lag(position: TableColumn, setpoint: TableColumn) -> float:
     """Samples by which the rate of a position follows that of its setpoint, and parts of one."""
     a, b = (np.diff(c.short) for c in (position, setpoint))
     size = 1 << (2 * len(a) - 1).bit_length()
@@ -178,7 +180,9 @@ def _lag(position: Column, setpoint: Column) -> float:
     return float(at - loop + (0.5 * (left - right) / bend if bend < 0.0 else 0.0))
 
 
-def follows(position: Column, setpoint: Column, force: Column | None = None, sign: int = 1) -> int:
+def follows(
+    position: TableColumn, setpoint: TableColumn, force: TableColumn | None = None, sign: int = 1
+) -> int:
     """How surely a column is measured and the other its setpoint; below 0, the other way round.
 
     A reading has steps and noise where a setpoint is smooth, and it comes later: 1 each. A
@@ -201,7 +205,7 @@ def follows(position: Column, setpoint: Column, force: Column | None = None, sig
     return votes
 
 
-def answer(force: Column, reading: Column) -> float:
+def answer(force: TableColumn, reading: TableColumn) -> float:
     """The largest correlation of the noise of a column with that of a force, up to 3 rows later.
 
     0 where there is no noise to answer.
@@ -213,7 +217,7 @@ def answer(force: Column, reading: Column) -> float:
     return max(found, key=abs)
 
 
-def sign_of(motion: Explained, position: Column, force: Column) -> int:
+def sign_of(motion: Explained, position: TableColumn, force: TableColumn) -> int:
     """The sign with which a force moves an axis; -1 where it is reversed.
 
     By its inertia; where that is not sure by what it answers to the noise of the reading, which a
@@ -227,12 +231,12 @@ def sign_of(motion: Explained, position: Column, force: Column) -> int:
     return -1 if abs(answered) < CHANCE else -int(np.sign(answered))
 
 
-def same(a: Column, b: Column) -> bool:
+def same(a: TableColumn, b: TableColumn) -> bool:
     """Whether two columns are one reading, in units of their own."""
     return abs(likeness(a.short, b.short)) > SAME
 
 
-def sums(columns: Sequence[Column]) -> Iterator[tuple[Column, Column, Column]]:
+def sums(columns: Sequence[TableColumn]) -> Iterator[tuple[TableColumn, TableColumn, TableColumn]]:
     """A column, and the two others whose sum it is, row by row."""
     for one, two in combinations(columns, 2):
         for total in columns:
@@ -244,9 +248,9 @@ def sums(columns: Sequence[Column]) -> Iterator[tuple[Column, Column, Column]]:
                 yield total, one, two
 
 
-def distinct(columns: Sequence[Column]) -> list[list[Column]]:
+def distinct(columns: Sequence[TableColumn]) -> list[list[TableColumn]]:
     """Columns by what they read: those that are the same together."""
-    groups: list[list[Column]] = []
+    groups: list[list[TableColumn]] = []
     for column in columns:
         group = next((g for g in groups if same(g[0], column)), None)
         if group is None:
@@ -256,5 +260,5 @@ def distinct(columns: Sequence[Column]) -> list[list[Column]]:
     return groups
 
 
-def columns_of(values: Mapping[str, Array]) -> dict[str, Column]:
-    return {name: Column(name, v) for name, v in values.items()}
+def columns_of(values: Mapping[str, Array]) -> dict[str, TableColumn]:
+    return {name: TableColumn(name, v) for name, v in values.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from twin.importers.proposal.courses import Column, course, follows, sign_of
+from twin.importers.proposal.courses import TableColumn, course, follows, sign_of
 from twin.importers.proposal.motion import Explained, explained
 from twin.importers.proposal.units import near
 from twin.logs.log import AxisLog, Log
@@ -57,17 +57,17 @@ def _of_axis(name: str, axis: AxisLog) -> Iterator[str]:
     sign = sign_of(motion, position, force)
     yield from (f"axes.{name}: {what}" for what in _of_force(motion, sign))
     if (goal := axis.columns.get("setpoint_position")) is not None:
-        setpoint = Column("setpoint_position", goal)
+        setpoint = TableColumn("setpoint_position", goal)
         said = _of_setpoint(position, setpoint, force, sign)
         yield from (f"axes.{name}: {what}" for what in said)
 
 
-def _columns(axis: AxisLog) -> tuple[Column, Column] | None:
+def _columns(axis: AxisLog) -> tuple[TableColumn, TableColumn] | None:
     """Position and force, or current; None where one is missing."""
     name = next((n for n in ("force", "current") if n in axis.columns), None)
     if name is None or "position" not in axis.columns:
         return None
-    return Column("position", axis.columns["position"]), Column(name, axis.columns[name])
+    return TableColumn("position", axis.columns["position"]), TableColumn(name, axis.columns[name])
 
 
 def _of_force(motion: Explained, sign: int) -> Iterator[str]:
@@ -80,7 +80,9 @@ def _of_force(motion: Explained, sign: int) -> Iterator[str]:
         yield PUSHES
 
 
-def _of_setpoint(position: Column, setpoint: Column, force: Column, sign: int) -> Iterator[str]:
+def _of_setpoint(
+    position: TableColumn, setpoint: TableColumn, force: TableColumn, sign: int
+) -> Iterator[str]:
     found = course(position, setpoint)
     if found is None:
         return

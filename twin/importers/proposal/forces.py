@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 from twin.importers.proposal.axes import DRIVING
 from twin.importers.proposal.courses import distinct, follows, same, sign_of, sums
-from twin.importers.proposal.lexicon import Quantity, Role
+from twin.importers.proposal.lexicon import Quantity, SignalRole
 from twin.importers.proposal.motion import Explained
 from twin.importers.proposal.names import Name
 from twin.importers.proposal.positions import TOLD
-from twin.importers.proposal.signals import Axis, Certainty, File, Signal
+from twin.importers.proposal.signals import Certainty, File, ProposedAxis, Signal
 
 CLOSE = 0.1  # of a force, by which the motion may explain one better, and the other be the drive's
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ForceCandidate:
     """A column that may be the force, and what the motion explains of it."""
 
     name: Name
@@ -26,7 +26,7 @@ class Candidate:
     @property
     def rank(self) -> tuple[bool, bool, bool]:
         """By its name: a measured force before a current, both before what was asked for."""
-        asked, is_force = self.name.role is Role.ASKED, self.name.quantity is Quantity.FORCE
+        asked, is_force = self.name.role is SignalRole.ASKED, self.name.quantity is Quantity.FORCE
         return not asked, is_force, not self.name.smoothed
 
     @property
@@ -34,7 +34,7 @@ class Candidate:
         return f"{100.0 * self.motion.best:.0f} %"
 
 
-def with_force(file: File, axis: Axis) -> Axis:
+def with_force(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with its force or current, which is asked for where the columns do not tell it."""
     axis, called = _drives_called(file, axis)
     if called:
@@ -51,15 +51,17 @@ def _may_drive(name: Name) -> bool:
     return not name.sure and name.role is None and name.unit is None
 
 
-def _candidates(file: File, position: Name, names: Sequence[Name]) -> list[Candidate]:
+def _candidates(file: File, position: Name, names: Sequence[Name]) -> list[ForceCandidate]:
     found = zip(names, file.explained(position, names), strict=True)
-    return [Candidate(name, motion) for name, motion in found]
+    return [ForceCandidate(name, motion) for name, motion in found]
 
 
-def _drives_called(file: File, axis: Axis) -> tuple[Axis, list[Name]]:
+def _drives_called(file: File, axis: ProposedAxis) -> tuple[ProposedAxis, list[Name]]:
     """The columns that names call a force or a current, less those that are a part of one."""
     called = [n for n in file.some(axis.free, *DRIVING) if n.sure or n.unit]
-    parts = {n.column: "a part of the command, by its name" for n in called if n.role is Role.PART}
+    parts = {
+        n.column: "a part of the command, by its name" for n in called if n.role is SignalRole.PART
+    }
     for total, *others in sums([file.column(n) for n in called]):
         why = f"{total.name} is the sum of {' and '.join(c.name for c in others)}"
         parts = {**{n: w for n, w in parts.items() if n != total.name},
@@ -71,7 +73,7 @@ def _drives_called(file: File, axis: Axis) -> tuple[Axis, list[Name]]:
 # --- forces that names tell -----------------------------------------------------------------------
 
 
-def _of_those_called(file: File, axis: Axis, names: Sequence[Name]) -> Axis:
+def _of_those_called(file: File, axis: ProposedAxis, names: Sequence[Name]) -> ProposedAxis:
     """Of several the measured ones that the motion explains; asked for where they are level."""
     candidates = _candidates(file, axis.signals["position"].name, names)
     axis, candidates = _without_feedforward(file, axis, candidates)
@@ -94,11 +96,11 @@ def _of_those_called(file: File, axis: Axis, names: Sequence[Name]) -> Axis:
 
 
 def _without_feedforward(
-    file: File, axis: Axis, candidates: list[Candidate]
-) -> tuple[Axis, list[Candidate]]:
+    file: File, axis: ProposedAxis, candidates: list[ForceCandidate]
+) -> tuple[ProposedAxis, list[ForceCandidate]]:
     """Less what is made of the setpoint alone, where something else is left."""
     setpoint, position = axis.signals.get("setpoint_position"), axis.signals["position"]
-    asked = [c for c in candidates if c.name.role is Role.ASKED]
+    asked = [c for c in candidates if c.name.role is SignalRole.ASKED]
     if setpoint is None or len(asked) == len(candidates):
         return axis, candidates
     by_setpoint = file.explained(setpoint.name, [c.name for c in asked])
@@ -111,7 +113,7 @@ def _without_feedforward(
     return axis.without(made), [c for c in candidates if c.name.column not in made]
 
 
-def _driven(file: File, one: Candidate, others: Sequence[Candidate]) -> bool:
+def _driven(file: File, one: ForceCandidate, others: Sequence[ForceCandidate]) -> bool:
     """Whether a force goes with a current: then it is the drive's, and no sensor's."""
     currents = [c for c in others if c.name.quantity is Quantity.CURRENT]
     return one.name.quantity is Quantity.FORCE and any(
@@ -119,7 +121,7 @@ def _driven(file: File, one: Candidate, others: Sequence[Candidate]) -> bool:
     )
 
 
-def _clearly_best(candidates: Sequence[Candidate]) -> list[Candidate]:
+def _clearly_best(candidates: Sequence[ForceCandidate]) -> list[ForceCandidate]:
     """The one of which the motion leaves far less than of the others, if there is one."""
     best, second = sorted(candidates, key=lambda c: -c.motion.best)[:2]
     far = 0.5  # of what is left of the second
@@ -127,7 +129,9 @@ def _clearly_best(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [best] if clear and best.motion.best > TOLD else []
 
 
-def _undecided(axis: Axis, field: str, candidates: Iterable[Candidate]) -> Axis:
+def _undecided(
+    axis: ProposedAxis, field: str, candidates: Iterable[ForceCandidate]
+) -> ProposedAxis:
     shares = ", ".join(f"{c.name.column} ({c.share})" for c in candidates)
     return axis.asking({
         field: f"axis {axis.name}: the motion explains {shares} alike; which of them is the {field}"
@@ -135,7 +139,7 @@ def _undecided(axis: Axis, field: str, candidates: Iterable[Candidate]) -> Axis:
     })  # fmt: skip
 
 
-def _taken(file: File, axis: Axis, field: str, one: Candidate) -> Axis:
+def _taken(file: File, axis: ProposedAxis, field: str, one: ForceCandidate) -> ProposedAxis:
     """With a column that its name tells, and what the motion says of it."""
     if one.motion.explains:
         sure, why = Certainty.SURE, f"so called, the motion explains {one.share} of it"
@@ -144,7 +148,7 @@ def _taken(file: File, axis: Axis, field: str, one: Candidate) -> Axis:
     return _with_sign(file, axis, Signal(field, one.name, sure, (why,)), one.motion)
 
 
-def _with_sign(file: File, axis: Axis, signal: Signal, motion: Explained) -> Axis:
+def _with_sign(file: File, axis: ProposedAxis, signal: Signal, motion: Explained) -> ProposedAxis:
     """With a force or current, and what the motion tells of its sign."""
     position = file.column(axis.signals["position"].name)
     sign = sign_of(motion, position, file.column(signal.name))
@@ -164,7 +168,9 @@ def _with_sign(file: File, axis: Axis, signal: Signal, motion: Explained) -> Axi
 # --- forces that only the motion tells ------------------------------------------------------------
 
 
-def _by_motion(file: File, axis: Axis, candidates: Sequence[Candidate]) -> Axis:
+def _by_motion(
+    file: File, axis: ProposedAxis, candidates: Sequence[ForceCandidate]
+) -> ProposedAxis:
     """Of columns without such a name, the one that the motion explains as a force."""
     position = axis.signals["position"].name
     told = [
@@ -198,7 +204,7 @@ def _by_motion(file: File, axis: Axis, candidates: Sequence[Candidate]) -> Axis:
 # --- what the force tells of the position ---------------------------------------------------------
 
 
-def exchanged(file: File, axis: Axis) -> Axis:
+def exchanged(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with setpoint and position exchanged where the numbers say that they are."""
     position, setpoint = (axis.signals.get(f) for f in ("position", "setpoint_position"))
     if position is None:
@@ -237,7 +243,7 @@ def _is_later(file: File, position: Signal, setpoint: Signal) -> bool:
     return found is not None and found.behind < 0.0
 
 
-def _votes(file: File, axis: Axis, position: Name, other: Name) -> int:
+def _votes(file: File, axis: ProposedAxis, position: Name, other: Name) -> int:
     """How surely another column is the setpoint of a position, and not the other way round."""
     force = axis.signals.get("force") or axis.signals.get("current")
     column = None if force is None else file.column(force.name)

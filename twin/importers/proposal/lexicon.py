@@ -27,7 +27,7 @@ class Quantity(Enum):
 CHANNELS = (Quantity.PRESSURE, Quantity.TEMPERATURE)  # beside the motion and its force
 
 
-class Role(Enum):
+class SignalRole(Enum):
     """Whether a column was measured, asked for, or is only a part of a command."""
 
     MEASURED = auto()
@@ -81,8 +81,8 @@ HINTS: Mapping[Quantity, str] = {
     Quantity.DRIVE: "u output out control vm mv",
 }
 
-ROLES: Mapping[Role, str] = {
-    Role.ASKED: """
+ROLES: Mapping[SignalRole, str] = {
+    SignalRole.ASKED: """
         setpoint setpoints set sp reference references ref target targets tgt desired des
         demand demanded dmd command commands commanded cmd cmptd computed goal goals
         requested request req nominal nom wanted planned plan trajectory traj profile
@@ -90,13 +90,13 @@ ROLES: Mapping[Role, str] = {
         consigne cons commande cible consigna comandada comandata comandato mando referencia
         riferimento objetivo obiettivo deseada desiderata
         指令 目标 目標 设定 設定 给定 期望 命令""",
-    Role.MEASURED: """
+    SignalRole.MEASURED: """
         actual act measured meas measure mes mesure mesuree feedback fb fbk fdb fdbk present pv
         real reel reelle readback reading sensor est estimate estimated observation obs monitor ist
         istwert gemessen mess messwert
         medida medido misurata misurato attuale reale effettiva lectura lettura
         实际 实测 反馈 当前 現在 実際 実測 実 フィードバック 測定""",
-    Role.PART: """
+    SignalRole.PART: """
         ff feedforward fwd ffw pid vorsteuerung comp compensation integral integrator additive
         offset ext external extern disturbance residual 前馈 前饋 外力""",
 }

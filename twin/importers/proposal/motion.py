@@ -110,7 +110,7 @@ def explained(position: Array, forces: Sequence[Array]) -> list[Explained]:
     stacked = np.stack(forces)
     width = SHORTEST
     while width * FEWEST <= OVERLAP * len(position) and width < len(position):
-        rows = Rows.of(position, width)
+        rows = MotionRows.of(position, width)
         if rows is None:
             break
         means = rows.means(stacked)
@@ -121,7 +121,7 @@ def explained(position: Array, forces: Sequence[Array]) -> list[Explained]:
 
 
 @dataclass(frozen=True)
-class Rows:
+class MotionRows:
     """A motion by test functions of ``width`` samples, of those in which it does not rest.
 
     columns (3, k): acceleration, velocity, its sign. place (4, k): orthonormal, of the position.
@@ -133,7 +133,7 @@ class Rows:
     place: Array
 
     @classmethod
-    def of(cls, position: Array, width: int) -> Rows | None:
+    def of(cls, position: Array, width: int) -> MotionRows | None:
         """None where the motion is too short for that width."""
         if len(position) < 2 * width:
             return None

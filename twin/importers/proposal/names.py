@@ -21,7 +21,7 @@ from twin.importers.proposal.lexicon import (
     SMOOTHED,
     UNITS,
     Quantity,
-    Role,
+    SignalRole,
 )
 
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ω": " omega ", "τ": " tau ", "α": " alpha "})
@@ -34,10 +34,10 @@ _PER = re.compile(r"(?i)^(.+?)(?:\s*[/_ ]\s*(s|ms|min|second)|ps)(?:\^?2|²)?$")
 _SQUARED = re.compile(r"(?i)(?:\^?2|²)$")
 _LETTER_OF_AXIS = re.compile(r"^([fmtivpau])([xyz])$")
 AXIS_LETTERS = frozenset("abcxyz")
-_SYMBOLS: Mapping[str, tuple[Quantity, Role | None]] = {
-    **{f"{q}{r}": (Quantity.POSITION, Role.ASKED) for q in "qxy" for r in "rg"},
-    **{f"{q}d": (Quantity.POSITION, Role.ASKED) for q in "xy"},
-    **{f"{q}m": (Quantity.POSITION, Role.MEASURED) for q in "qxy"},
+_SYMBOLS: Mapping[str, tuple[Quantity, SignalRole | None]] = {
+    **{f"{q}{r}": (Quantity.POSITION, SignalRole.ASKED) for q in "qxy" for r in "rg"},
+    **{f"{q}d": (Quantity.POSITION, SignalRole.ASKED) for q in "xy"},
+    **{f"{q}m": (Quantity.POSITION, SignalRole.MEASURED) for q in "qxy"},
 }
 # what a "d" or "r" behind asks for: q_d, tau_J_d
 _ASKED_BY_A_LETTER = frozenset(("q", "qd", "dq", "qdd", "ddq", "tau", *"xyzvwuif", "theta", "iq"))
@@ -54,7 +54,7 @@ class Name:
 
     column: str
     quantity: Quantity | None
-    role: Role | None
+    role: SignalRole | None
     unit: str | None
     axis: tuple[str, ...]
     sure: bool
@@ -62,10 +62,10 @@ class Name:
 
 
 @cache
-def _meanings() -> Mapping[str, frozenset[Quantity | Role]]:
+def _meanings() -> Mapping[str, frozenset[Quantity | SignalRole]]:
     """Every word of quantities and roles."""
-    out: dict[str, set[Quantity | Role]] = {}
-    words: list[tuple[Quantity | Role, str]] = [*QUANTITIES.items(), *ROLES.items()]
+    out: dict[str, set[Quantity | SignalRole]] = {}
+    words: list[tuple[Quantity | SignalRole, str]] = [*QUANTITIES.items(), *ROLES.items()]
     for meaning, said in words:
         for word in said.split():
             out.setdefault(word, set()).add(meaning)
@@ -225,8 +225,8 @@ def _name(column: str, shared: frozenset[str]) -> Name:
     if role is None and (symbol := next((s for w in told if (s := _SYMBOLS.get(w))), None)):
         quantity, role = quantity or symbol[0], symbol[1]
     if quantity is None and [w for w in told if not w.isdigit()] == ["r"]:
-        quantity, role = Quantity.POSITION, Role.ASKED
-    if quantity is None and role in (Role.MEASURED, Role.ASKED):
+        quantity, role = Quantity.POSITION, SignalRole.ASKED
+    if quantity is None and role in (SignalRole.MEASURED, SignalRole.ASKED):
         quantity = Quantity.POSITION  # act, ref: of what, is not said
     letter = "a" if quantity is Quantity.ACCELERATION and not sure else ""
     axis = _axis([w for w in words if w != letter], sure) if quantity else ()
@@ -305,16 +305,16 @@ def _is_raw(may: Sequence[tuple[Quantity, str]]) -> bool:
     return bool(may) and may[0][1] in RAW
 
 
-def _role(words: Sequence[str], quantity: Quantity | None) -> Role | None:
-    said = {m for w in words for m in _meanings().get(w, ()) if isinstance(m, Role)}
+def _role(words: Sequence[str], quantity: Quantity | None) -> SignalRole | None:
+    said = {m for w in words for m in _meanings().get(w, ()) if isinstance(m, SignalRole)}
     current = "current" in words and quantity not in (Quantity.CURRENT, None)
     *first, last = [w for w in words if not w.isdigit()] or [""]
-    if Role.PART in said and quantity in (Quantity.FORCE, Quantity.CURRENT):
-        return Role.PART
+    if SignalRole.PART in said and quantity in (Quantity.FORCE, Quantity.CURRENT):
+        return SignalRole.PART
     by_letter = last in ("d", "r") and bool(_ASKED_BY_A_LETTER & set(first))
-    if Role.ASKED in said or (by_letter and quantity not in (Quantity.OTHER, *CHANNELS)):
-        return Role.ASKED
-    return Role.MEASURED if Role.MEASURED in said or current else None
+    if SignalRole.ASKED in said or (by_letter and quantity not in (Quantity.OTHER, *CHANNELS)):
+        return SignalRole.ASKED
+    return SignalRole.MEASURED if SignalRole.MEASURED in said or current else None
 
 
 def _axis(words: Sequence[str], sure: bool) -> tuple[str, ...]:

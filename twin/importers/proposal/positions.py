@@ -7,10 +7,10 @@ from dataclasses import replace
 from itertools import permutations
 
 from twin.importers.proposal.axes import DRIVING, is_drive, is_position
-from twin.importers.proposal.courses import Course, follows
-from twin.importers.proposal.lexicon import Quantity, Role
+from twin.importers.proposal.courses import ColumnCourse, follows
+from twin.importers.proposal.lexicon import Quantity, SignalRole
 from twin.importers.proposal.names import Name
-from twin.importers.proposal.signals import Axis, Certainty, File, Signal
+from twin.importers.proposal.signals import Certainty, File, ProposedAxis, Signal
 from twin.importers.proposal.units import is_rate, is_raw, near, position_unit, unit_as_large
 
 TOLD = 0.3  # of a force, from which the motion tells that it is one
@@ -18,10 +18,10 @@ RATE = 0.9  # of likeness, of a column that nothing but its course calls a rate
 AS_LARGE = 1.25  # times a position, its setpoint, which a soft loop may miss
 
 
-def with_position(file: File, axis: Axis) -> Axis:
+def with_position(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with its position, which is asked for where no column looks like one."""
     called = [n for n in file.some(axis.free, Quantity.POSITION) if is_position(n)]
-    sure = [n for n in called if n.sure or n.role is Role.MEASURED or n.unit]
+    sure = [n for n in called if n.sure or n.role is SignalRole.MEASURED or n.unit]
     if names := sure or called:
         return axis.having(_of_those_called(file, axis, names))
     return _by_course(file, axis)
@@ -29,10 +29,10 @@ def with_position(file: File, axis: Axis) -> Axis:
 
 def _rank(name: Name) -> tuple[bool, bool, bool, bool]:
     told = name.sure or name.unit is not None
-    return name.role is Role.MEASURED, told, name.unit is not None, not name.smoothed
+    return name.role is SignalRole.MEASURED, told, name.unit is not None, not name.smoothed
 
 
-def _of_those_called(file: File, axis: Axis, names: Sequence[Name]) -> Signal:
+def _of_those_called(file: File, axis: ProposedAxis, names: Sequence[Name]) -> Signal:
     """The measured one, else the one whose motion makes a force, else the one that follows."""
     alike = [n for n in names if _rank(n) == max(map(_rank, names))]
     if len(alike) == 1:
@@ -64,7 +64,7 @@ def _is_measured(file: File, one: Name, other: Name, forces: Sequence[Name]) -> 
 # --- a position that no name tells ----------------------------------------------------------------
 
 
-def _by_course(file: File, axis: Axis) -> Axis:
+def _by_course(file: File, axis: ProposedAxis) -> ProposedAxis:
     free = [n for n in file.some(axis.free, None) if not file.column(n).rises]
     if pair := _with_its_rate(file, free):
         position, velocity, how = pair
@@ -76,7 +76,7 @@ def _by_course(file: File, axis: Axis) -> Axis:
     drives = [n for n in file.some(axis.free, *DRIVING) if is_drive(n)]
     if found := _that_drives(file, free, drives):
         return axis.having(found)
-    asked = [n for n in file.some(axis.free, Quantity.POSITION) if n.role is Role.ASKED]
+    asked = [n for n in file.some(axis.free, Quantity.POSITION) if n.role is SignalRole.ASKED]
     what = f"no column of {', '.join(axis.columns)} looks like a position"
     if asked:
         what = f"{asked[0].column} is a setpoint; no column looks like the measured position"
@@ -119,7 +119,7 @@ def _that_drives(file: File, free: Sequence[Name], drives: Sequence[Name]) -> Si
 # --- its rate, and what it was to be --------------------------------------------------------------
 
 
-def with_rates(file: File, axis: Axis) -> Axis:
+def with_rates(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with the velocities that names tell, where they go as the rate of the position."""
     position = axis.signals["position"].name
     counted = is_raw(position_unit(file, axis)[0])
@@ -128,7 +128,7 @@ def with_rates(file: File, axis: Axis) -> Axis:
     axis = axis.without({n.column: "counted: the position tells it too" for n in raw})
     for field, asked in (("velocity", False), ("setpoint_velocity", True)):
         called = [n for n in file.some(axis.free, Quantity.VELOCITY)
-                  if (n.role is Role.ASKED) is asked]  # fmt: skip
+                  if (n.role is SignalRole.ASKED) is asked]  # fmt: skip
         if field in axis.signals or not called:
             continue
         likely = {
@@ -146,10 +146,10 @@ def with_rates(file: File, axis: Axis) -> Axis:
     return axis
 
 
-def with_setpoints(file: File, axis: Axis) -> Axis:
+def with_setpoints(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The axis with its setpoints: so called, or going as the position or its rate."""
     position = axis.signals["position"].name
-    asked = [n for n in file.some(axis.free, Quantity.POSITION) if n.role is Role.ASKED]
+    asked = [n for n in file.some(axis.free, Quantity.POSITION) if n.role is SignalRole.ASKED]
     called = sorted(asked, key=_rank, reverse=True)
     going = [n for n in called if file.course(position, n)]
     if going and (found := file.course(position, going[0])):
@@ -163,7 +163,7 @@ def with_setpoints(file: File, axis: Axis) -> Axis:
     return _rate_by_course(file, axis)
 
 
-def _setpoint_by_course(file: File, axis: Axis) -> Axis:
+def _setpoint_by_course(file: File, axis: ProposedAxis) -> ProposedAxis:
     """The columns that go as the position, as large in some unit: its setpoint leads it."""
     position = axis.signals["position"].name
     unit, _ = position_unit(file, axis)
@@ -183,13 +183,13 @@ def _setpoint_by_course(file: File, axis: Axis) -> Axis:
     return axis
 
 
-def _lag(file: File, found: Course) -> str:
+def _lag(file: File, found: ColumnCourse) -> str:
     side = "ahead of" if found.behind >= 0.0 else "behind"
     lag = abs(found.behind) * (1e3 * file.step if file.step else 1.0)
     return f"{lag:.2g} {'ms' if file.step else 'rows'} {side} it"
 
 
-def _rate_by_course(file: File, axis: Axis) -> Axis:
+def _rate_by_course(file: File, axis: ProposedAxis) -> ProposedAxis:
     """A setpoint of the velocity that no name tells."""
     position, setpoint = axis.signals["position"].name, axis.signals.get("setpoint_position")
     if setpoint is None or "setpoint_velocity" in axis.signals:
@@ -202,7 +202,7 @@ def _rate_by_course(file: File, axis: Axis) -> Axis:
     return axis
 
 
-def _unlike(file: File, axis: Axis) -> list[Name]:
+def _unlike(file: File, axis: ProposedAxis) -> list[Name]:
     """Columns whose names say nothing, or what the numbers do not."""
     free = file.some(axis.free, None, Quantity.VELOCITY)
     letters = [n for n in file.some(axis.free, Quantity.DRIVE) if not n.sure]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from twin.importers.proposal.courses import Column, Course, course
+from twin.importers.proposal.courses import ColumnCourse, TableColumn, course
 from twin.importers.proposal.lexicon import Quantity
 from twin.importers.proposal.motion import Explained, explained
 from twin.importers.proposal.names import Name
@@ -45,7 +45,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Axis:
+class ProposedAxis:
     """What is proposed for an axis.
 
     signals: by field. asked: by field, what is needed where the columns do not tell. not_used: by
@@ -64,15 +64,15 @@ class Axis:
     sign: int = 1
     comes_round: bool = False
 
-    def having(self, *signals: Signal) -> Axis:
+    def having(self, *signals: Signal) -> ProposedAxis:
         """The same with these signals too."""
         return replace(self, signals={**self.signals, **{s.field: s for s in signals}})
 
-    def asking(self, what: Mapping[str, str]) -> Axis:
+    def asking(self, what: Mapping[str, str]) -> ProposedAxis:
         """The same, with fields left open."""
         return replace(self, asked={**self.asked, **what})
 
-    def without(self, reasons: Mapping[str, str]) -> Axis:
+    def without(self, reasons: Mapping[str, str]) -> ProposedAxis:
         """The same, with columns that are not used."""
         return replace(self, not_used={**self.not_used, **reasons})
 
@@ -91,14 +91,14 @@ class File:
     """
 
     names: Mapping[str, Name]
-    columns: Mapping[str, Column]
+    columns: Mapping[str, TableColumn]
     step: float | None
 
     def some(self, columns: Sequence[str], *quantities: Quantity | None) -> list[Name]:
         """The names of these columns that say one of these quantities."""
         return [self.names[c] for c in columns if self.names[c].quantity in quantities]
 
-    def column(self, name: Name) -> Column:
+    def column(self, name: Name) -> TableColumn:
         """The column of a name."""
         return self.columns[name.column]
 
@@ -107,7 +107,7 @@ class File:
         short = [self.column(f).short for f in forces]
         return explained(self.column(position).short, short)
 
-    def course(self, position: Name, other: Name) -> Course | None:
+    def course(self, position: Name, other: Name) -> ColumnCourse | None:
         """Whether a column goes as a position."""
         return course(self.column(position), self.column(other))
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from twin.importers.proposal.channels import SI, channel_unit
-from twin.importers.proposal.courses import Column
+from twin.importers.proposal.courses import TableColumn
 from twin.importers.proposal.lexicon import Quantity
-from twin.importers.proposal.signals import Axis, File, Signal
+from twin.importers.proposal.signals import File, ProposedAxis, Signal
 from twin.importers.proposal.units import (
     ANGLES,
     LENGTHS,
@@ -58,7 +58,7 @@ class Need:
 
 
 @dataclass(frozen=True)
-class Entry:
+class MapEntry:
     """A line of the map: a signal in its unit. needs: what is not known of it.
 
     size: of one of it, the entry and its value, where it is known.
@@ -70,7 +70,7 @@ class Entry:
     needs: tuple[Need, ...] = ()
     size: tuple[str, str] | None = None
 
-    def line(self, column: Column) -> str:
+    def line(self, column: TableColumn) -> str:
         """As it stands in the map."""
         values = {"column": _quoted(self.signal.column), "unit": _quoted(self.unit)}
         if self.size is not None:
@@ -89,7 +89,7 @@ class Entry:
         told = "; ".join((sure, span, *jumps, *assumed, *self.remarks))
         return f"{self.signal.field} = {{{table}}} # {told}"
 
-    def answered(self, answers: Answers) -> Entry:
+    def answered(self, answers: Answers) -> MapEntry:
         """The same with what the user knows."""
         entry = self
         for need in self.needs:
@@ -107,12 +107,12 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def entries_of(file: File, axis: Axis) -> list[Entry]:
+def entries_of(file: File, axis: ProposedAxis) -> list[MapEntry]:
     """The signals of an axis in their units."""
     return [_entry(file, axis, axis.signals[f]) for f in ORDER if f in axis.signals]
 
 
-def _entry(file: File, axis: Axis, signal: Signal) -> Entry:
+def _entry(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     if signal.field == "position":
         return _of_position(file, axis, signal)
     if signal.field == "setpoint_position":
@@ -124,26 +124,26 @@ def _entry(file: File, axis: Axis, signal: Signal) -> Entry:
     return _of_drive(file, axis, signal)
 
 
-def _of_channel(file: File, axis: Axis, signal: Signal) -> Entry:
+def _of_channel(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     unit, stated = channel_unit(signal, file.column(signal.name))
     if is_raw(unit):
         return _without_scale(axis, signal, unit, SI[signal.field])
-    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
+    return MapEntry(signal, unit) if stated else _assumed(axis, signal, unit)
 
 
-def _of_position(file: File, axis: Axis, signal: Signal) -> Entry:
+def _of_position(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     unit, stated = position_unit(file, axis)
     if is_raw(unit):
         return _without_scale(axis, signal, unit, _angle_or_length(axis))
-    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
+    return MapEntry(signal, unit) if stated else _assumed(axis, signal, unit)
 
 
-def _angle_or_length(axis: Axis) -> str:
+def _angle_or_length(axis: ProposedAxis) -> str:
     """The unit of a position that is counted; either where nothing tells whether the axis turns."""
     return "rad" if turns(axis) else "m" if moves_straight(axis) else "rad or m"
 
 
-def _of_setpoint(file: File, axis: Axis, signal: Signal) -> Entry:
+def _of_setpoint(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     unit, stated = position_unit(file, axis)
     found = file.course(axis.signals["position"].name, signal.name)
     own = None if found is None else unit_as_large(
@@ -156,16 +156,16 @@ def _of_setpoint(file: File, axis: Axis, signal: Signal) -> Entry:
     if own is not None:
         told = f"as large as the position in {own}" if signal.name.unit is None else ""
         signal = signal.because(told) if told else signal
-        return Entry(signal, own) if stated or signal.name.unit else _assumed(axis, signal, own)
+        return MapEntry(signal, own) if stated or signal.name.unit else _assumed(axis, signal, own)
     said = f"one of it is {1.0 / found.slope:.4g} of the position" if found else "its unit is open"
     of = signal.name.unit or unit
     if is_raw(of) or is_raw(unit) or signal.name.unit is None:
         return _without_scale(axis, signal, "counts" if not is_raw(of) else of,
                               _angle_or_length(axis), said)  # fmt: skip
-    return Entry(signal, of, (f"but {said}: correct one of the units",))
+    return MapEntry(signal, of, (f"but {said}: correct one of the units",))
 
 
-def _of_velocity(file: File, axis: Axis, signal: Signal) -> Entry:
+def _of_velocity(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     position = axis.signals["position"]
     base, _ = position_unit(file, axis)
     unit = signal.name.unit
@@ -174,7 +174,7 @@ def _of_velocity(file: File, axis: Axis, signal: Signal) -> Entry:
         return _without_scale(axis, signal, unit if unit and is_raw(unit) else "counts", si)
     if unit is not None:
         ratio = rate_ratio(file, position, signal, base, unit)
-        return Entry(signal, unit, _off(ratio, unit, signal.field))
+        return MapEntry(signal, unit, _off(ratio, unit, signal.field))
     if (own := customary(signal.name)) is None:
         own = f"{base}/s"
     family = ANGLES if base in ANGLES else LENGTHS
@@ -195,7 +195,7 @@ def _off(ratio: float, unit: str, field: str) -> tuple[str, ...]:
     return (f"but one of it is {1.0 / ratio:.3g} {unit} by the position: correct one of the units",)
 
 
-def _of_drive(file: File, axis: Axis, signal: Signal) -> Entry:
+def _of_drive(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     rotary = turns(axis)
     unit, stated = drive_unit(signal.name, file.column(signal.name), rotary)
     si = "A" if signal.field == "current" else "N m" if rotary else "N"
@@ -206,15 +206,17 @@ def _of_drive(file: File, axis: Axis, signal: Signal) -> Entry:
         return _without_scale(axis, signal, "counts", si, f"for one {of}: {hint}")
     if unit is None or is_raw(unit):
         return _without_scale(axis, signal, unit or "1", si)
-    return Entry(signal, unit) if stated else _assumed(axis, signal, unit)
+    return MapEntry(signal, unit) if stated else _assumed(axis, signal, unit)
 
 
-def _assumed(axis: Axis, signal: Signal, unit: str) -> Entry:
+def _assumed(axis: ProposedAxis, signal: Signal, unit: str) -> MapEntry:
     need = Need(axis.name, signal.field, UNIT, f"the unit of {signal.column}", unit)
-    return Entry(signal, unit, ("unit ASSUMED",), (need,))
+    return MapEntry(signal, unit, ("unit ASSUMED",), (need,))
 
 
-def _without_scale(axis: Axis, signal: Signal, unit: str, si: str, how: str = "") -> Entry:
+def _without_scale(
+    axis: ProposedAxis, signal: Signal, unit: str, si: str, how: str = ""
+) -> MapEntry:
     """An entry that the map cannot be used with until somebody gives its scale."""
     what, entry, hint = f"{si} for one of {signal.column}", SCALE, f", {how}" if how else ""
     remark = f"scale NOT KNOWN: {si} for one{hint}"
@@ -224,13 +226,13 @@ def _without_scale(axis: Axis, signal: Signal, unit: str, si: str, how: str = ""
         what = f"{entry} of the encoder of {signal.column}{either}"
         remark = f"{entry} NOT KNOWN{either}{hint}"
     need = Need(axis.name, signal.field, entry, f"{what}{f' ({how})' if how else ''}")
-    return Entry(signal, unit, (remark,), (need,))
+    return MapEntry(signal, unit, (remark,), (need,))
 
 
 # --- the lines of an axis -------------------------------------------------------------------------
 
 
-def lines_of(file: File, axis: Axis, answers: Answers) -> Iterator[str]:
+def lines_of(file: File, axis: ProposedAxis, answers: Answers) -> Iterator[str]:
     """The table of an axis, with what is asked for and what is not used."""
     yield ""
     yield f"[axes.{axis.name}]"
@@ -257,11 +259,11 @@ def lines_of(file: File, axis: Axis, answers: Answers) -> Iterator[str]:
         yield f"# not used: {', '.join(alike)}: {why}"
 
 
-def _constant_unit(axis: Axis) -> str:
+def _constant_unit(axis: ProposedAxis) -> str:
     return "N m/A" if turns(axis) else "N/A" if moves_straight(axis) else "N/A or N m/A"
 
 
-def constant_of(axis: Axis) -> Need | None:
+def constant_of(axis: ProposedAxis) -> Need | None:
     """The force constant, where an axis has a current and no force."""
     if "current" not in axis.signals or "force" in axis.signals or "force" in axis.asked:
         return None
@@ -269,7 +271,7 @@ def constant_of(axis: Axis) -> Need | None:
                 f"the force constant of axis {axis.name} in {_constant_unit(axis)}")  # fmt: skip
 
 
-def needs_of(file: File, axis: Axis) -> list[Need]:
+def needs_of(file: File, axis: ProposedAxis) -> list[Need]:
     """All that the columns do not tell of an axis."""
     needs = [need for entry in entries_of(file, axis) for need in entry.needs]
     constant = constant_of(axis)
@@ -283,7 +285,7 @@ _KINDS: Mapping[Quantity, str] = {
 }
 
 
-def why_not(file: File, axis: Axis, column: str) -> str:
+def why_not(file: File, axis: ProposedAxis, column: str) -> str:
     """Why a column of an axis is none of its signals."""
     if column in axis.not_used:
         return axis.not_used[column]

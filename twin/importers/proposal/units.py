@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from twin.importers.proposal.courses import Column
+from twin.importers.proposal.courses import TableColumn
 from twin.importers.proposal.lexicon import CUSTOMARY, RAW, TURNING, Quantity
 from twin.importers.proposal.names import Name, words_of
-from twin.importers.proposal.signals import Axis, File, Signal
+from twin.importers.proposal.signals import File, ProposedAxis, Signal
 from twin.importers.units import COUNTS, find_unit, is_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
@@ -33,7 +33,7 @@ def is_counted(unit: str) -> bool:
     return unit.partition("/")[0] in COUNTS
 
 
-def turns(axis: Axis) -> bool:
+def turns(axis: ProposedAxis) -> bool:
     """Whether an axis is rotary: by a unit, or by words where no unit is stated."""
     for field, signal in axis.signals.items():
         if LINEAR_UNITS[field] != ROTARY_UNITS[field]:
@@ -45,7 +45,7 @@ def turns(axis: Axis) -> bool:
     return axis.comes_round or any(TURNING & set(words_of(s.column)) for s in axis.signals.values())
 
 
-def moves_straight(axis: Axis) -> bool:
+def moves_straight(axis: ProposedAxis) -> bool:
     """Whether an axis is linear: by a unit, or as nothing is counted and nothing says it turns."""
     signals = axis.signals.items()
     if any(LINEAR_UNITS[f] != ROTARY_UNITS[f] and is_unit(s.name.unit, LINEAR_UNITS[f])
@@ -59,7 +59,7 @@ def customary(name: Name) -> str | None:
     return next((u for code, u in CUSTOMARY.items() if re.search(code, name.column)), None)
 
 
-def position_unit(file: File, axis: Axis) -> tuple[str, bool]:
+def position_unit(file: File, axis: ProposedAxis) -> tuple[str, bool]:
     """The unit of the position, and whether its name states it, or the rate that a name states."""
     position = axis.signals["position"]
     if position.name.unit is not None:
@@ -127,7 +127,7 @@ def is_rate(file: File, position: Name, velocity: Name) -> float:
     return how if any(near(ratio / size, 1.03) for size in sizes) else 0.0
 
 
-def drive_unit(name: Name, column: Column, rotary: bool) -> tuple[str | None, bool]:
+def drive_unit(name: Name, column: TableColumn, rotary: bool) -> tuple[str | None, bool]:
     """The unit of a force or current, None where only the user knows it; and whether it is stated.
 
     A torque beside a length, or a force beside an angle, is one that a scale brings to the axis.
