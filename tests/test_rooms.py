@@ -160,6 +160,15 @@ def test_each_room_says_what_it_is_for() -> None:
                 assert ast.get_docstring(parsed(path)), f"{path} says nothing"
 
 
+def test_the_name_of_a_class_has_one_meaning() -> None:
+    known: dict[str, list[str]] = {}
+    for module, path in (modules(IDENTIFY) | modules(TWIN)).items():
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                known.setdefault(node.name, []).append(module)
+    assert not {name: where for name, where in known.items() if len(where) > 1}
+
+
 def test_only_effects_know_a_pitch_a_unit_or_another_number_of_the_stage() -> None:
     for path in [*IDENTIFY.rglob("*.py"), *TWIN.rglob("*.py")]:
         if path.parent == TWIN / "effects" and path.name != "__init__.py":

@@ -25,7 +25,7 @@ class InertialEntry(Entry):
     unit: str
 
 
-class ErrorsEntry(Entry):
+class BodyErrorsEntry(Entry):
     """RMS force errors of an axis without and with a change."""
 
     before: Number
@@ -51,7 +51,7 @@ class BodyEntry(Entry):
     """By these joints, or only together with others."""
     disagreeing: list[str]
     """Logs that by themselves tell another change."""
-    errors: dict[str, ErrorsEntry]
+    errors: dict[str, BodyErrorsEntry]
 
 
 class BodyAnswer(Answer, BodyEntry):
@@ -76,7 +76,7 @@ def values_of_body(found: WrongBody, model: MachineModel) -> dict[str, Any]:
         for name, (value, band) in found.differing.items()
     }
     errors = {
-        axis: ErrorsEntry.of(own, unit=model.axes[axis].units.force)
+        axis: BodyErrorsEntry.of(own, unit=model.axes[axis].units.force)
         for axis, own in found.errors.items()
     }
     return {"parameters": told, "errors": errors}

@@ -16,7 +16,7 @@ from identify.output.answers.bodies import BodyEntry, values_of_body
 from identify.output.answers.fits import (
     EstimateEntry,
     FeedforwardAnswer,
-    RecordingEntry,
+    ReadOtherwiseEntry,
     estimate_entries,
 )
 from identify.output.answers.plans import PlanAnswer
@@ -260,7 +260,7 @@ class DiagnosisAnswer(Answer, DiagnosisEntry):
     axes: dict[str, DiagnosisEntry]
     body: BodyEntry | None
     """Of a mechanism, the body of which most is told; the axes are told with it as it was found."""
-    recording: RecordingEntry | None
+    recording: ReadOtherwiseEntry | None
     """Of a mechanism, in what its recording is another than its file needs."""
     bodies: list[BodyEntry]
     """All bodies of which something is told."""
@@ -280,7 +280,7 @@ def _(result: Diagnosis, **more: Any) -> DiagnosisAnswer:
     axes = {axis: _diagnosis(result, axis) for axis in result.axes}
     bodies = [BodyEntry.of(body, **values_of_body(body, result.fitted)) for body in result.bodies]
     body = next(iter(bodies), None)
-    recording = result.recording and RecordingEntry.of(result.recording)
+    recording = result.recording and ReadOtherwiseEntry.of(result.recording)
     leading, model = axes[result.leading.dataset.axis], result.model
     mujoco = model.mjcf if body else None
     written = {"model": format_model(model), "mujoco": mujoco}

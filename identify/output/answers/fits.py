@@ -62,7 +62,7 @@ class FitEntry(Entry):
     refit: Refit | None
 
 
-class RecordingEntry(Entry):
+class ReadOtherwiseEntry(Entry):
     """How a recording is another than a mechanism's file needs; all else is of it as read so."""
 
     said: str
@@ -83,7 +83,7 @@ class FitAnswer(Answer):
     """Axes of which no training log says anything."""
     left_out: list[str] = Field([])
     """Logs that say nothing of an axis, and why."""
-    recording: RecordingEntry | None
+    recording: ReadOtherwiseEntry | None
     """Of a mechanism, in what its recording is another than its file needs."""
 
 
@@ -104,7 +104,7 @@ def _(result: FitResult, **more: Any) -> FitAnswer:
         )
         for axis, fit in result.fits.items()
     }
-    recording = RecordingEntry.of(result.recording) if result.recording else None
+    recording = ReadOtherwiseEntry.of(result.recording) if result.recording else None
     rest = list(result.not_fitted)
     return FitAnswer(axes=axes, not_fitted=rest, recording=recording, **more)
 
@@ -288,13 +288,13 @@ class ComparisonAnswer(Answer):
 
     axes: dict[str, ComparisonEntry]
     left_out: list[str] = Field([])
-    recording: RecordingEntry | None
+    recording: ReadOtherwiseEntry | None
     """Of a mechanism, in what its recording is another than its file needs."""
 
 
 @answer_of.register
 def _(result: Comparison, **more: Any) -> ComparisonAnswer:
-    recording = RecordingEntry.of(result.recording) if result.recording else None
+    recording = ReadOtherwiseEntry.of(result.recording) if result.recording else None
     axes = {a: _comparison(c) for a, c in result.axes.items()}
     return ComparisonAnswer.of(axes=axes, recording=recording, **more)
 

@@ -13,7 +13,7 @@ from twin.experiments.kinds import kind_of
 from twin.record import Number
 
 
-class ExperimentEntry(Entry):
+class SimulatedEntry(Entry):
     """An experiment as it was simulated, and what it is expected to show."""
 
     experiment: dict[str, Any]
@@ -29,7 +29,7 @@ class ExperimentEntry(Entry):
     """On the parameters of one model, nats; null of two explanations."""
 
 
-class PlanAnswer(Answer, ExperimentEntry):
+class PlanAnswer(Answer, SimulatedEntry):
     """What `twin plan` prints: the chosen experiment, and those it was chosen from."""
 
     axis: str
@@ -39,7 +39,7 @@ class PlanAnswer(Answer, ExperimentEntry):
     favoured_by_the_logs: str | None
     refitted_on_logs: bool
     missing_motion: str
-    ranking: list[ExperimentEntry]
+    ranking: list[SimulatedEntry]
     not_run: list[str]
     file: File | None = None
     setpoints: File | None = None
@@ -54,7 +54,7 @@ def _(result: Plan, **more: Any) -> PlanAnswer:
         **_experiment(result.chosen, several),
         refitted_on_logs=not result.supposed,
         missing_motion=gap_in_words(result.gap),
-        ranking=[ExperimentEntry.of(t, **_experiment(t, several)) for t in in_order(result)],
+        ranking=[SimulatedEntry.of(t, **_experiment(t, several)) for t in in_order(result)],
         not_run=[not_run_in_words(n) for n in result.not_run],
         **more,
     )
