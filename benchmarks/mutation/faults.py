@@ -211,6 +211,15 @@ def is_native(source: str, line: int) -> bool:
     return False
 
 
+def is_at_import(source: str, line: int) -> bool:
+    """Whether a line is in no function, and so runs once, for whichever test is the first."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    return not any(
+        isinstance(node, functions) and node.body[0].lineno <= line <= (node.end_lineno or 0)
+        for node in ast.walk(ast.parse(source))
+    )
+
+
 def draw(root: Path, count: int, seed: int, least: int = LEAST) -> list[Fault]:
     """Faults in lines drawn at random: ``least`` of each folder, the rest by its lines.
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.figures import Figure, Target, report
-from benchmarks.mutation.faults import LEAST, PACKAGES, Fault, draw, is_native
+from benchmarks.mutation.faults import LEAST, PACKAGES, Fault, draw, is_at_import, is_native
 from benchmarks.mutation.reach import Reach, environment, reach
 
 TITLE = "Faults in lines drawn at random that the tests notice"
@@ -61,7 +61,8 @@ def _trial(clean: Path, fault: Fault, known: Reach, number: int) -> Trial:
     shutil.copytree(clean, copy)
     try:
         (copy / fault.path).write_text(fault.applied(source))
-        tests = known.tests_for(fault, BUDGET, is_native(source, fault.line))
+        kinds = is_native(source, fault.line), is_at_import(source, fault.line)
+        tests = known.tests_for(fault, BUDGET, *kinds)
         noticed, by = _tested(copy, tests)
     finally:
         shutil.rmtree(copy, ignore_errors=True)

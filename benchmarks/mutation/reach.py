@@ -36,16 +36,18 @@ class Reach:
     seconds: Mapping[str, float]
     contexts: Mapping[str, Mapping[int, frozenset[str]]]
 
-    def tests_for(self, fault: Fault, budget: float, native: bool = False) -> list[str]:
+    def tests_for(
+        self, fault: Fault, budget: float, native: bool = False, at_import: bool = False
+    ) -> list[str]:
         """Tests that can notice a fault, of ``budget`` seconds together.
 
         Tests that name the subject of its file, such as an effect, come first, then those of its
         folder, the quickest first.
-        Coverage does not record native code, nor what runs at import or in a process of its own;
-        there any test of the folder counts, or any at all.
+        Coverage does not record native code, nor what runs in a process of its own, and what runs
+        at import for one test alone; there any of the file or of the folder counts, or any at all.
         """
         by_line = self.contexts.get(fault.path, {})
-        own = by_line.get(fault.line, frozenset())
+        own = frozenset() if at_import else by_line.get(fault.line, frozenset())
         reached = own or frozenset().union(*by_line.values())
         chosen = {t for t in self.seconds if t in reached or t.partition("::")[0] in reached}
         room = self._room(fault)

@@ -11,7 +11,15 @@ import pytest
 
 pytest.importorskip("cosmic_ray", reason="comes with the extra `bench`")
 
-from benchmarks.mutation.faults import Fault, draw, faults_on, is_native, operators, shares
+from benchmarks.mutation.faults import (
+    Fault,
+    draw,
+    faults_on,
+    is_at_import,
+    is_native,
+    operators,
+    shares,
+)
 from benchmarks.mutation.noticed import Trial, figures
 from benchmarks.mutation.reach import Reach, teller
 
@@ -87,6 +95,10 @@ def test_tests_of_a_line_come_quickest_first_and_within_the_budget() -> None:
     assert known.tests_for(Fault("x.py", 9, "k", 0), 10.0) == ["d", "b", "c", "a"]
     assert known.tests_for(Fault("y.py", 1, "k", 0), 1.0) == ["d"]
     assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, native=True) == ["d"]
+    assert known.tests_for(Fault("x.py", 7, "k", 0), 1.0, at_import=True) == ["d"]
+    files = Reach({"a": 1.0, "b": 2.0}, {"x.py": {1: frozenset("a"), 7: frozenset("b")}})
+    assert files.tests_for(Fault("x.py", 1, "k", 0), 10.0) == ["a"]
+    assert files.tests_for(Fault("x.py", 1, "k", 0), 10.0, at_import=True) == ["a", "b"]
     shared = Reach({"t.py::a": 1.0, "t.py::b": 2.0, "c": 0.1}, {"x.py": {7: frozenset({"t.py"})}})
     assert shared.tests_for(Fault("x.py", 7, "k", 0), 10.0) == ["t.py::a", "t.py::b"]
     assert [teller(f"t.py::a|{phase}") for phase in ("run", "setup")] == ["t.py::a", "t.py"]
@@ -112,3 +124,8 @@ def test_shares_are_counted_by_folder() -> None:
     found = {f.what: f.value for f in figures(done, 7)}
     assert found == {"all, seed 7": pytest.approx(2 / 3), "twin": 0.5, "identify": 1.0}
     assert Counter(f.passed for f in figures(done, 7)) == {False: 2, True: 1}
+
+
+def test_what_runs_at_import_is_in_no_function() -> None:
+    source = "A = 1\n\n\nclass B:\n    c = 2\n\n    def d(self, e=3):\n        return 4\n"
+    assert [is_at_import(source, line) for line in (1, 5, 7, 8)] == [True, True, True, False]
