@@ -68,11 +68,19 @@ def require_shown(effect: Effect, axes: Mapping[str, tuple[AxisModel, Dataset]])
 
 def _shows(axis: AxisModel, dataset: Dataset, effect: Effect) -> bool:
     """Whether the logs tell more numbers of the axis with the effect than it has without."""
-    if not is_logged(effect, dataset):
+    if not is_logged(effect, dataset) or _is_fitted(axis, effect):
         return False
     if not effect.sticks or sticks(axis):
         return True
     return is_informative(dataset, True, fitted_count(axis))
+
+
+def _is_fitted(axis: AxisModel, effect: Effect) -> bool:
+    """Whether an effect is mass more or less of an axis whose mass is fitted already.
+
+    Beside a body on a spring it would tell the masses of both sides, which is no payload.
+    """
+    return effect.added_mass is not None and not axis.mass_fixed
 
 
 def is_logged(effect: Effect, dataset: Dataset) -> bool:
@@ -98,6 +106,7 @@ def not_tried(
         elif (
             is_logged(effect, dataset)
             and axis.can_have(effect)
+            and not _is_fitted(axis, effect)
             and not _shows(axis, dataset, effect)
         ):
             found[name] = RestsTooOften()

@@ -15,7 +15,7 @@ from identify.dataset.preparation import datasets
 from identify.dataset.prepared_log import moving
 from identify.dataset.spectrum import fitted_levels
 from identify.estimation.intervals import NotExcited
-from identify.estimation.offered import RestsTooOften
+from identify.estimation.offered import RestsTooOften, not_tried, offered
 from twin.errors import InputError
 from twin.logs import ROTARY_UNITS, AxisLog, Log
 from twin.logs.log import LINEAR_UNITS
@@ -175,6 +175,19 @@ def test_after_a_whole_turn_a_shaft_that_turns_round_is_where_it_was(rate, units
     run = {"run": turned(rate, 0.0, units)}
     dataset = datasets(MachineModel("m", {"x": axis}, RATE), run, held)["x"]
     assert bool(dataset.beyond) is outside
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_mass_more_or_less_is_asked_for_where_the_mass_is_held(held: bool) -> None:
+    """Else it is the mass, which is fitted; beside a body on a spring it would be part of that."""
+    axis = replace(SLIDE, mass_fixed=held)
+    model = MachineModel("m", {"x": axis}, RATE)
+    dataset = datasets(model, {"run": logged(SLIDE, Ride(5, 4.0))}, {})["x"]
+    known = few("payload_mass", "spring")
+    assert set(offered(axis, dataset, known)) == (
+        {"payload_mass", "spring"} if held else {"spring"}
+    )
+    assert not not_tried(model, dataset, known)
 
 
 def test_what_acts_through_a_mass_is_not_tried_on_imposed_motion_and_the_answer_says_so():
