@@ -1,4 +1,4 @@
-"""What is shown of a result is made of: blocks, which are written as text, or drawn on a page."""
+"""Blocks, of which all is made that is shown of a result: written as text, or drawn on a page."""
 
 from __future__ import annotations
 

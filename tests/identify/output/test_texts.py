@@ -25,9 +25,11 @@ from identify.estimation.found_shape import FoundCurve, FoundShape, FreeExponent
 from identify.estimation.intervals import refusal
 from identify.estimation.offered import RestsTooOften
 from identify.experiment_design.candidate_experiments import NotRun
+from identify.output.blocks import blocks_of
 from identify.output.machine import check_text, effect_text, effects_text, laws_text
 from identify.output.words import fleet as words
 from identify.output.words.verdict import named_in_words
+from identify.printed import Pictured, Printed
 from identify.results.fleet import (
     Alarm,
     Floor,
@@ -285,6 +287,15 @@ def kept() -> dict[str, str]:
 
 def test_there_is_a_text_of_every_result() -> None:
     assert list(kept()) == list(TEXTS)
+
+
+def test_every_kind_of_result_has_something_to_show() -> None:
+    bare = [k for k in kinds(Printed) if blocks_of.dispatch(k) is blocks_of.dispatch(object)]
+    assert bare == [Pictured]  # which is no result, but what several are
+
+
+def kinds(of: type) -> list[type]:
+    return [k for own in of.__subclasses__() for k in (own, *kinds(own))]
 
 
 @pytest.mark.parametrize("name", TEXTS)

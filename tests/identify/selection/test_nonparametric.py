@@ -145,7 +145,6 @@ def test_nothing_is_kept_on_an_honest_machine(name: str, seed: int) -> None:
     assert found.gain.after < 1.01 * found.gain.before
 
 
-@SLOW
 def test_a_physical_effect_takes_the_place_of_a_description(tmp_path: Path) -> None:
     machine = with_x(CATALOGUE["cogging"], a1=0.05, p=0.03)
     logs = recorded(machine, (1,), SHORT)
