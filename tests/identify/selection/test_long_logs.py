@@ -46,3 +46,13 @@ def test_what_begins_behind_the_beginnings_is_told_of_the_whole_of_long_logs() -
     assert found.final.ratio > 10.0
     assert found.unexplained is not None
     assert found.unexplained.depends_on == "time"
+
+
+def test_a_rival_that_the_beginnings_leave_level_is_refused_by_the_whole_of_long_logs() -> None:
+    true = having(SLIDE, "stribeck", Fc=0.31, Fs=0.5, v0=0.02, sigma2=0.53)
+    fitted, held = (logged(true, Ride(seed, LONG)) for seed in (1, 2))
+    known = few("stribeck", "lugre")
+    found = diagnose_axis(*begun(SLIDE, {"fitted": fitted}, {"held": held}), known)
+    assert found.in_part
+    assert (found.named, found.ambiguous_with) == (("stribeck",), ())
+    assert {"stribeck", "lugre"} <= {c.effect.name for c in found.ranking}
