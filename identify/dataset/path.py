@@ -69,6 +69,12 @@ class Path:
         """In which blocks (n,) the axis may stand for some of their samples."""
         return np.asarray(self._still_samples.any(axis=1))
 
+    def calm(self, blocks: int) -> NDArray[np.bool_]:
+        """In which runs (n - blocks + 1,) of blocks readings lie no farther apart than by noise."""
+        count = blocks * self.samples + 1
+        span = _highest(self.readings, count) + _highest(-self.readings, count)
+        return np.asarray(span[:: self.samples] < self.room)
+
     @property
     def _still_samples(self) -> NDArray[np.bool_]:
         still = self._still

@@ -200,7 +200,7 @@ def stands(motion: Motion) -> NDArray[np.bool_]:
 
     Where noise alone makes velocities as large, the mean over as many blocks as it takes tells it:
     an axis that sticks for some of them seems to dither. One that swings comes back too, but its
-    readings around lie farther apart than by noise.
+    readings around, and meanwhile, lie farther apart than by noise.
     """
     still = at_rest(motion.velocity)
     least = REST_SPEED * float(np.abs(motion.velocity).max()) * motion.period
@@ -209,13 +209,20 @@ def stands(motion: Motion) -> NDArray[np.bool_]:
     over = min(int(noise / least) + 1, len(still)) if least > 0.0 else 1
     if over > 1:
         gone = np.cumsum(np.pad(motion.velocity * motion.period, (1, 0)))
-        held = np.flatnonzero(np.abs(gone[over:] - gone[:-over]) < over * least)
-        edges = np.zeros(len(still) + 1)
-        np.add.at(edges, held, 1.0)
-        np.add.at(edges, held + over, -1.0)
-        back = np.cumsum(edges)[:-1] > 0.0
-        still |= back if motion.path is None else back & motion.path.pauses
+        back = np.abs(gone[over:] - gone[:-over]) < over * least
+        if motion.path is None:
+            return still | _within(back, over)
+        still |= _within(back, over) & motion.path.pauses
+        still |= _within(back & motion.path.calm(over), over)
     return still
+
+
+def _within(runs: NDArray[np.bool_], blocks: int) -> NDArray[np.bool_]:
+    """Which of all blocks (n,) are within one of these runs (n - blocks + 1,) of some blocks."""
+    edges = np.zeros(len(runs) + blocks)
+    edges[: len(runs)] += runs
+    edges[blocks:] -= runs
+    return np.asarray(np.cumsum(edges)[:-1] > 0.0)
 
 
 def last_direction(velocity: Array) -> Array:
