@@ -71,8 +71,7 @@ class Path:
 
     def calm(self, blocks: int) -> NDArray[np.bool_]:
         """In which runs (n - blocks + 1,) of blocks readings lie no farther apart than by noise."""
-        count = blocks * self.samples + 1
-        span = _highest(self.readings, count) + _highest(-self.readings, count)
+        span = _span(self.readings, blocks * self.samples + 1)
         return np.asarray(span[:: self.samples] < self.room)
 
     @property
@@ -88,8 +87,7 @@ class Path:
         """
         around = max(round(SHORTEST / self.period), FEWEST) // 2
         x = np.pad(self.readings, around, mode="edge")
-        span = _highest(x, 2 * around + 1) + _highest(-x, 2 * around + 1)
-        return np.asarray(span < self.room)
+        return np.asarray(_span(x, 2 * around + 1) < self.room)
 
     def during(self, first: int, end: int) -> Path:
         """The same of the samples from one to another."""
@@ -186,6 +184,11 @@ def _smooth(signal, apart, out):
             near = signal[max(i - apart, 0)] + signal[min(i + apart, last)]
             far = signal[max(i - 2 * apart, 0)] + signal[min(i + 2 * apart, last)]
         out[i] = SPLINE[2] * signal[i] + SPLINE[1] * near + SPLINE[0] * far
+
+
+def _span(signal: Array, samples: int) -> Array:
+    """How far apart (n - samples + 1,) so many values in a row of a signal (n,) lie."""
+    return _highest(signal, samples) + _highest(-signal, samples)
 
 
 def _highest(signal: Array, samples: int) -> Array:

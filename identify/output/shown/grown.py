@@ -40,7 +40,8 @@ def addition_blocks(result: Addition) -> list[Block]:
 def all_added_blocks(result: AllAdded) -> list[Block]:
     """What was added to each axis, and the errors before and after all of it."""
     blocks: list[Block] = []
-    for axis in dict.fromkeys(step.axis for step in result.steps):
+    axes = [*dict.fromkeys(step.axis for step in result.steps)]
+    for axis in axes:
         steps = [step for step in result.steps if step.axis == axis]
         laws = [step.effect for step in steps if step.action != "body"]
         bodies = [step.effect for step in steps if step.action == "body"]
@@ -48,7 +49,7 @@ def all_added_blocks(result: AllAdded) -> list[Block]:
         if bodies:
             said.append(f"corrected body {listed(bodies)}, which moves with axis {axis}")
         below = [*_errors_of(steps[0], result.model.axes[axis].units.words)]
-        if not result.kept and axis == result.steps[-1].axis:
+        if not result.kept and axis == axes[-1]:
             below.append(
                 "These logs do not prove all of it: go on with the model before, or diagnose it "
                 "with them."
