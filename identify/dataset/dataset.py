@@ -106,6 +106,7 @@ class Dataset:
         if not training:
             training, test = test[:1], test[1:]
         training = tuple(replace(log, reach=EVERYWHERE) for log in training)
+        selection, test = (within_reach(logs, training) for logs in (selection, test))
         return replace(self, training=training, selection=selection, test=test)
 
     def at_length(self, length: float) -> Dataset:

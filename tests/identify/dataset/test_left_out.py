@@ -142,10 +142,13 @@ def log(centre: float, phase: float, force=step_beyond):
     return log_of(SILENT_RATE, x, 5.3 * a + 0.31 * np.sign(v) + 0.53 * v + force(x) + noise)
 
 
+MODEL_OF_PLACE = MachineModel("m", {"x": SPRUNG})
+
+
 def dataset_of(*centres: float) -> Dataset:
     fit = {"one": log(0.0, 0.3), "two": log(0.0, 1.1)}
     held = {f"held {i}": log(c, 2.0 + i) for i, c in enumerate(centres)}
-    return datasets(MachineModel("m", {"x": SPRUNG}), fit, held, test_function=0.05)["x"]
+    return datasets(MODEL_OF_PLACE, fit, held, test_function=0.05)["x"]
 
 
 def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
@@ -167,6 +170,15 @@ def test_what_lies_beyond_the_fit_logs_tests_nothing() -> None:
     (told,) = [text for text in prepared_in_words(tested) if "no training log has been" in text]
     assert "of this test log is left out" in told
     assert realigned(beyond, 1e-4).beyond == pytest.approx(beyond.beyond, abs=0.02)
+
+
+def test_without_a_training_log_less_is_tested_too() -> None:
+    """What the log left out had reached alone, nobody predicts without it."""
+    far = {"near": log(0.0, 0.3), "far": log(0.02, 1.1)}
+    every = datasets(MODEL_OF_PLACE, far, {"held": log(0.02, 2.0)}, test_function=0.05)["x"]
+    assert every.beyond == {}
+    assert 0.2 < every.without("far").beyond["held"] < 0.6
+    assert every.without("near").beyond == {}
 
 
 def test_held_out_logs_that_share_little_test_all_the_same() -> None:
