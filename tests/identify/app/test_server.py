@@ -14,14 +14,18 @@ import pytest
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
 from app_runs import asked
+from planted_logs import SLIDE, having
 
 from identify.app import jobs as queue
 from identify.app.commands import checked
-from identify.app.guard import upload_name
+from identify.app.guard import POLICY, upload_name
 from identify.app.jobs import Jobs
 from identify.app.server import STATIC, Server, application
+from identify.app.state import model_of
 from identify.project.folder import Folder
 from twin.errors import InputError
+from twin.model.file import save_model
+from twin.model.machine import AxisIntervals, MachineModel
 
 TOKEN, PORT = "a-token", 8123
 HOST = f"127.0.0.1:{PORT}"
@@ -45,7 +49,10 @@ def test_the_token_opens_it_once_and_a_cookie_keeps_it_open(app):
     cookie = first.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
-    assert asked(app, "/", **KNOWN).status == 200
+    page = asked(app, "/", **KNOWN)
+    assert page.status == 200
+    assert page.headers["content-security-policy"] == POLICY
+    assert page.headers["cache-control"] == "no-store"
 
 
 @pytest.mark.parametrize(
@@ -123,6 +130,23 @@ def test_a_page_asks_for_commands_of_the_loop_alone(tmp_path, words):
     (tmp_path / "out.csv").symlink_to("/etc/hostname")
     with pytest.raises(InputError):
         checked(tmp_path, words)
+
+
+def test_a_model_is_shown_with_its_units_and_intervals(tmp_path):
+    axis = having(SLIDE, "cogging", p=0.021, a1=0.9)
+    model = MachineModel("m", {"x": axis}, 1000.0)
+    ends = {"mass": (5.2, 5.4), "cogging.a1": (0.8, 1.0)}
+    model = model.with_intervals("x", AxisIntervals(ends, 1.1))
+    folder = Folder(tmp_path)
+    save_model(model, tmp_path / "m.toml")
+    shown = model_of(folder, "m.toml")["axes"]["x"]
+    values = {v["name"]: v for v in shown["values"]}
+    assert values["mass"]["shown"] == "5.30 kg"
+    assert values["mass"]["band"] == ["5.20 kg", "5.40 kg"]
+    cogging = next(e for e in shown["effects"] if e["name"] == "cogging")
+    bands = {v["name"]: v["band"] for v in cogging["values"]}
+    assert bands["a1"] == ["800 mN", "1.00 N"]
+    assert not bands["p"]
 
 
 def test_what_a_page_may_ask_for(tmp_path):

@@ -19,6 +19,7 @@ import pytest
 from cli_runs import refusal
 from machines import tracked
 
+from identify.fleet.change_point import AFTER
 from identify.fleet.floor import STAGE
 from identify.fleet.live_diagnosis import Background, named_in
 from identify.fleet.served import serving
@@ -176,6 +177,15 @@ def test_parameters_are_followed_and_one_that_changes_is_found(log) -> None:
     assert abs(found.value - 1.1 * found.fitted) < 2.0 * found.half < 0.01 * found.fitted
     usual = {p.name: p for p in told(Watcher(MODEL), log)[-1].axes[0].parameters}
     assert abs(usual["coulomb_viscous.Fc"].value - found.fitted) < 0.01 * found.fitted
+
+
+def test_the_usual_error_is_that_of_the_windows_that_were_well(log) -> None:
+    first, *_ = (w for w in told(Watcher(MODEL), log) if w.axes)
+    assert first.axes[0].usual is None
+    watcher = Watcher(MODEL)
+    watcher.errors["x"] = [0.02, 0.03, 0.07] * AFTER
+    again, *_ = (w for w in told(watcher, log) if w.axes)
+    assert again.axes[0].usual == 0.03
 
 
 def told(watcher: Watcher, log: Log) -> list[Window]:

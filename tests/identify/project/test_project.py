@@ -126,7 +126,7 @@ def test_what_is_lacking_is_said_in_one_line(tmp_path):
         ("new", "has no recording in role training selection; `twin import FILE`"),
         ("undo", "nothing was changed yet"),
         ("project init", "is a project already"),
-        ("project role a.mcap --to test", "is no recording of this project"),
+        ("project role a.mcap --to test", "is no recording of this project; there are none yet"),
         ("add --found", "has no model yet"),
     ):
         done = twin(*words.split(), folder=tmp_path)
