@@ -145,7 +145,7 @@ def test_a_model_is_shown_with_its_units_and_intervals(tmp_path):
     assert values["mass"]["band"] == ["5.20 kg", "5.40 kg"]
     cogging = next(e for e in shown["effects"] if e["name"] == "cogging")
     bands = {v["name"]: v["band"] for v in cogging["values"]}
-    assert bands["a1"] == ["800 mN", "1.00 N"]
+    assert bands["a1"] == ["0.800 N", "1.00 N"]
     assert not bands["p"]
 
 
