@@ -37,6 +37,7 @@ from identify.selection.changes import (
 )
 from identify.selection.controls import ControlTest
 from identify.selection.held import has_collapsed, is_held
+from identify.selection.law_or_curve import NEARLY, follows, laws_for
 from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.trying import (
     LEADERS,
@@ -54,8 +55,6 @@ from twin.effects import Catalogue
 from twin.model.machine import AxisModel
 from twin.parallel import Progress, silent, within
 from twin.threads import trim_memory
-
-NEARLY = 0.66  # of the part that the best takes, from which another law does nearly as well
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,13 +307,16 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
         return [Step(noise[0])]
     if not lowering:
         return []
-    best = _best_of(lowering)
-    if isinstance(best.change, Reshaped):
-        lowering = _laws_for(best, judged, tried) or lowering
+    most = best = _best_of(lowering)
+    if isinstance(most.change, Reshaped):
+        curves = [t for t in lowering if isinstance(t.change, Reshaped)]
+        lowering = laws_for(most, judged, tried) or curves
         best = _best_of(lowering)
     tied = [best, *(t for t in lowering if t is not best and is_tied(t, best))]
     # A law leads a free curve that is no better: whatever is missing beside it bends the curve too.
     first = simplest([t for t in tied if not isinstance(t.change, Reshaped)] or tied)
+    if most not in lowering and follows(first, most):
+        tied.append(most)
     kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
     others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
     return [Step(first, others, kin=alike)]
@@ -345,25 +347,6 @@ def _best_of(tried: Sequence[Tried]) -> Tried:
     for one in others:
         best = best if is_tied(best, one) else one
     return best
-
-
-def _laws_for(curve: Tried, judged: Judged, tried: Sequence[Tried]) -> list[Tried]:
-    """The laws that take about as much as a free curve, which are preferred to it.
-
-    It has shown that something is missing, so none of them has to be the best of many by itself.
-    A further one of a law that the model has takes as much: a few sines imitate any curve.
-    """
-
-    def least(t: Tried) -> float:
-        # A curve of ten numbers can imitate any law.
-        return (1.0 if t.change.effect.number > 1 else NEARLY) * curve.candidate.part
-
-    laws = [t for t in tried if not isinstance(t.change, Reshaped) and t.candidate.part >= least(t)]
-    alone = (
-        t if t.candidate.supported else judged_change(judged, t.screening, t.judged.fit)
-        for t in laws
-    )
-    return [t for t in alone if t.candidate.supported]
 
 
 def _together(
