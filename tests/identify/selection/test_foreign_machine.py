@@ -11,11 +11,21 @@ import pytest
 import identify
 from benchmarks import silence
 from benchmarks.drives import row
-from benchmarks.foreign import CATALOGUE, FORMS, STAGE, diagnosed, model_for, planted_row
+from benchmarks.foreign import (
+    CATALOGUE,
+    DURATION,
+    FORMS,
+    STAGE,
+    diagnosed,
+    made,
+    model_for,
+    planted_row,
+)
+from benchmarks.judgement import fitted
 from benchmarks.second_simulator.drives import Recorder
 from benchmarks.second_simulator.effects import INSIDE
-from benchmarks.second_simulator.machine import drawn
-from identify.selection.diagnosis import AxisDiagnosis, Verdict
+from benchmarks.second_simulator.machine import drawn, logs_of
+from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from twin.effects import Catalogue
 from twin.logs import AxisLog, Log
 
@@ -59,6 +69,21 @@ def test_sines_that_stand_for_the_shape_of_a_cable_are_not_told() -> None:
     found = planted_row("end_stop", 20.0, 58, [*FORMS])
     assert not [f for f in found["findings"] if f["mark"] == "wrong"]
     assert any(f["effect"] == "cable_slab" for f in found["findings"])
+
+
+@pytest.mark.slow  # 80 s
+def test_a_cable_of_another_form_is_no_cogging_and_no_end_stop() -> None:
+    """Beside a drift and other bumps both were named, of which a curve took twice as much.
+
+    The last of its three logs chooses.
+    """
+    one = made("thermal_drift", 8.0, 59, [*FORMS])
+    training, held = logs_of(one.machine, one.code, DURATION)
+    *others, last = (training | held).items()
+    dataset, base = fitted(one.model, "x", dict(others), dict([last]))
+    answer = diagnose_axis(base, dataset, CATALOGUE)
+    assert answer.named == ("thermal_drift",)
+    assert {"cable_slab", "roller_spikes"} <= {f.effect for f in answer.findings}
 
 
 # A drive as many are: dry friction that sticks at each turn, and an encoder of a micrometre
