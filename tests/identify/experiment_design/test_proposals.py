@@ -18,7 +18,7 @@ from identify.experiment_design.discrimination import (
     require_within_limits,
 )
 from identify.output.as_json import json_of
-from identify.output.words.next_step import not_run_in_words
+from identify.output.words.next_step import all_not_run_in_words, not_run_in_words
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
 from twin.experiments.kinds import KINDS, Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
@@ -156,6 +156,9 @@ def test_what_cannot_run_is_told_with_its_reason_and_a_mistake_is_not_passed_ove
     assert trials == []
     assert not_run_in_words(first).startswith("passes: axis x, span 9 m")
     assert "outside its travel" in first.reason
+    assert all_not_run_in_words([first]) == [not_run_in_words(first)]
+    (both,) = all_not_run_in_words([first, first])
+    assert both.startswith("2 passes: ")
     assert "(with" not in not_run_in_words(replace(first, truth=None))
     assert not_run_in_words(replace(first, truth="wear")).endswith("(with wear)")
     with pytest.raises(InputError, match="effort"):

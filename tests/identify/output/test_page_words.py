@@ -12,6 +12,7 @@ from identify.dataset.noise_floor import NoiseFloor
 from identify.estimation.confounded import MovedParameter
 from identify.experiment_design.missing_excitation import Gap
 from identify.output.numbers import DisplayUnit, capitalised, quantity, span, typeset
+from identify.output.words.findings import role_in_words
 from identify.output.words.fit import moved_in_words, noise_in_words, place_in_words
 from identify.output.words.next_step import (
     axis_in_words,
@@ -19,6 +20,7 @@ from identify.output.words.next_step import (
     notes_in_words,
 )
 from identify.results.grown import Addition
+from identify.selection.roles import RoleDependent
 from twin.experiments.file import in_short
 from twin.experiments.kinds import Rests
 from twin.model.machine import HistoryStep
@@ -194,3 +196,10 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
     told, note = notes(curve, (moved,))
     assert told.startswith("empirical_map is a fitted curve, not a physical law")
     assert note.startswith("mass moved")
+
+
+def test_by_which_log_a_law_is_proved_is_said_with_its_score() -> None:
+    lost = role_in_words(RoleDependent("wear", named=True, part=-0.3, t=-1.27))
+    assert lost.endswith("choosing it is not proved: it takes 0 % of what is left, t = -1.3")
+    gained = role_in_words(RoleDependent("wear", named=False, part=0.12, t=0.8))
+    assert "as they are not (it takes 12 % of what is left, t = 0.8)" in gained

@@ -68,6 +68,12 @@ def test_commands_without_arguments_take_their_logs_by_role(walked):
     assert command[3:6] == ["models/1.toml", found["recordings"][0]["file"], "--holdout"]
 
 
+def test_only_a_diagnosis_of_the_present_model_tells_what_to_add(walked):
+    said = twin("add", "--found", folder=walked).stderr
+    assert "has no diagnosis of its present model; `twin diagnose` makes one" in said
+    assert len(said.splitlines()) == 1
+
+
 def test_the_error_in_the_ledger_is_that_of_the_command_outside(walked, tmp_path):
     logs = [str(walked / r["file"]) for r in ledger(walked)["recordings"]]
     roles = [logs[0], "--holdout", logs[1], "--test", logs[2]]

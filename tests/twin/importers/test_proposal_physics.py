@@ -150,7 +150,7 @@ def test_a_torque_beside_a_length_asks_for_the_screw(tmp_path):
     columns = {"pos [mm]": 1e3 * SERVO.position, "torque [Nm]": SERVO.force}
     axes, text, missing = proposed(tmp_path, columns)
     assert "scale" not in axes["x"]["force"]
-    assert "2 pi / lead of the screw" in text
+    assert "for one Nm: 2 pi / lead of the screw" in text
     assert len(missing) == 1
 
 
