@@ -1,7 +1,7 @@
 """The numbers of small real runs are those that were read once.
 
 What the laws of other tests leave open, such as a factor in a floor or the order of two arguments,
-moves one of some thousand numbers here. `PYTHONPATH=tests python tests/identify/test_numbers.py`
+moves one of some thousand numbers here. `PYTHONPATH=tests python tests/identify/test_numbers_of_runs.py`
 writes them anew, to be read first: whoever changes them says why each of them moved.
 """
 
@@ -44,7 +44,7 @@ from twin.model.file import format_model
 from twin.model.machine import MachineModel
 from twin.simulation.simulate import simulate
 
-KEPT = Path(__file__).with_name("numbers.json")
+KEPT = Path(__file__).with_name("numbers_of_runs.json")
 NEAR = 2e-3  # of a number: other processors round otherwise, and a fit ends a little elsewhere
 BY_CHANCE = "errors_of_starts"  # where other starts of a search end
 SMALL = 1e-9  # of no unit: a number that is nothing but rounding
