@@ -1,8 +1,8 @@
 """The numbers of small real runs are those that were read once.
 
 What the laws of other tests leave open, such as a factor in a floor or the order of two arguments,
-moves one of some thousand numbers here. `PYTHONPATH=tests python tests/identify/test_numbers_of_runs.py`
-writes them anew, to be read first: whoever changes them says why each of them moved.
+moves one of some thousand numbers here. They are written anew, to be read first, by
+`PYTHONPATH=tests python tests/identify/test_numbers_of_runs.py`; whoever changes them says why.
 """
 
 from __future__ import annotations
