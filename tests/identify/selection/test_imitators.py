@@ -64,6 +64,7 @@ def test_what_repeats_too_few_times_is_told_as_a_force_of_position(pitch, imitat
     assert finding_in_words(finding)[0].startswith(told if imitated else "cogging explains")
 
 
+@pytest.mark.slow  # 5 s
 def test_beside_a_force_of_position_another_is_more_of_it():
     """The second was named as a cogging with 99 %, or as a spring."""
     known = few("cogging", "spring", "quadratic_drag")

@@ -48,6 +48,7 @@ def test_what_begins_behind_the_beginnings_is_told_of_the_whole_of_long_logs() -
     assert found.unexplained.depends_on == "time"
 
 
+@pytest.mark.slow  # 3 s
 def test_a_rival_that_the_beginnings_leave_level_is_refused_by_the_whole_of_long_logs() -> None:
     true = having(SLIDE, "stribeck", Fc=0.31, Fs=0.5, v0=0.02, sigma2=0.53)
     fitted, held = (logged(true, Ride(seed, LONG)) for seed in (1, 2))

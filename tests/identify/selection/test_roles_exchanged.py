@@ -58,6 +58,7 @@ def test_a_law_that_a_touched_log_hides_is_told_to_depend_on_roles_whichever_log
         assert (law.effect, law.named) == ("cogging", named)
 
 
+@pytest.mark.slow  # 4 s
 def test_what_one_log_does_not_propose_and_both_prove_is_named_whichever_log_chooses() -> None:
     def sticky(x: Array, v: Array) -> Array:
         return 0.4 * np.sign(v) * np.exp(-((v / 0.01) ** 2))
