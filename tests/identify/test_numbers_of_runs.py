@@ -76,19 +76,12 @@ def slides() -> list[dict[str, Log]]:
 
 @cache
 def fit_of_stage() -> identify.FitResult:
-    one, two, three = stage()
-    return identify.fit(PROTON, one, two, three)
+    return identify.fit(PROTON, *stage())
 
 
 @cache
 def diagnosis_of_slide() -> identify.Diagnosis:
-    one, two, three = slides()
-    return identify.diagnose(SLIDER, one, two, three, catalogue=FEW)
-
-
-def added() -> identify.Addition:
-    one, two, three = slides()
-    return identify.add("cogging", SLIDER, one, two, three)
+    return identify.diagnose(SLIDER, *slides(), catalogue=FEW)
 
 
 def arm() -> identify.Diagnosis:
@@ -109,12 +102,17 @@ def response() -> identify.FrequencyResponse:
     return identify.frequency_response(Log(1.0 / machine.period, {"q": AxisLog(columns)}))
 
 
+def stage_with(effects: dict[str, dict[str, float]]) -> MachineModel:
+    """The x axis of the stage, with more effects than it has."""
+    axis = PROTON.axes["x"]
+    for name, values in effects.items():
+        axis = having(axis, name, **values)
+    return MachineModel("stage", {"x": axis}, PROTON.sample_rate)
+
+
 def of_late_motor() -> identify.FitResult:
     """A stage whose motor lags, on a load that swings, read by an encoder with an error."""
-    axis = PROTON.axes["x"]
-    for name, values in LATE.items():
-        axis = having(axis, name, **values)
-    machine = MachineModel("late", {"x": axis}, PROTON.sample_rate)
+    machine = stage_with(LATE)
     logs = {"a": simulate(machine, "moves", seed=4, duration=3.0)}
     return identify.fit(machine, logs)
 
@@ -183,10 +181,8 @@ FAULTY: dict[str, dict[str, Any]] = {
 
 def of_exports() -> dict[str, Any]:
     """The numbers in the text of all files of a machine of many effects."""
-    axis = PROTON.axes["x"]
-    for name, values in {**LATE, "cogging": {"p": 0.024, "a1": 0.2, "b2": -0.05}}.items():
-        axis = having(axis, name, **values)
-    model = MachineModel("rich", {"x": axis}, PROTON.sample_rate)
+    rich = {**LATE, "cogging": {"p": 0.024, "a1": 0.2, "b2": -0.05}}
+    model = replace(stage_with(rich), name="rich")
     made = {}
     for form in ("c", "csv", "ros2_control", "twincat"):
         for file, text in find_exporter(form).export(model, stage()[0]).files.items():
@@ -226,7 +222,7 @@ RUNS: dict[str, Callable[[], Any]] = {
         *(identify.fit(diagnosis_of_slide().model, logs) for logs in slides()[:2])
     ),
     "diagnosis of a slide": diagnosis_of_slide,
-    "cogging added to a slide": added,
+    "cogging added to a slide": lambda: identify.add("cogging", SLIDER, *slides()),
     "diagnosis of an arm": arm,
     "fit of a late motor": of_late_motor,
     "response of two masses": response,
@@ -236,9 +232,7 @@ RUNS: dict[str, Callable[[], Any]] = {
     "columns of a file": of_columns,
     "logs of experiments": of_experiments,
     "records of a night": of_nights,
-    "experiment that decides": lambda: identify.plan(
-        MachineModel("stage", {"x": PROTON.axes["x"]}, PROTON.sample_rate), duration=2.0
-    ),
+    "experiment that decides": lambda: identify.plan(stage_with({}), duration=2.0),
     "first model of a stage": lambda: identify.first_model(stage()[0]),
 }
 
