@@ -39,7 +39,7 @@ from twin.signals import Array
 
 AROUND = 0.1  # standard deviation of those, in parts of each value
 FIRST_EVALUATIONS = 10  # of the search from each, after which the best goes on with all
-TOLERANCE = 1e-6  # relative fall of the squared error, below which the search ends
+TOLERANCE = 1e-4  # relative fall of the squared error that dents make, below which the search ends
 OF_OTHER_AXIS = ("X_OTHER", "V_OTHER", "A_OTHER")
 
 
