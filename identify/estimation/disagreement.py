@@ -41,7 +41,7 @@ MOMENT = 0.1  # of a log; what lasts longer is no moment
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Of one log what tells: residual (n,) N, its columns (n, k), states (n, 4), times (n,) s.
+    """Of one log what tells: residual (n,) N, its columns (n, k), states (n, 5), times (n,) s.
 
     recorded (n, 3): N per unit of each of Recorded. size (k + 3,): N per unit, by which the columns
     were divided; 1 of those of the recording. named (k + 3,): which of these may be another value
@@ -212,11 +212,15 @@ def _recorded(log: PreparedLog) -> Array:
 
 
 def _states(log: PreparedLog) -> Array:
-    """Position, velocity, acceleration and its rate (n, 4) by test functions."""
+    """Position, velocity, acceleration and its rate by test functions, and whether it turns back.
+
+    (n, 5); the last is 1 where it does, of which what a law of friction lacks may be all.
+    """
     w, motion = log.test_function, log.motion
-    means = w.mean(np.stack([motion.position, motion.velocity]))
+    x, v, speed = w.mean(np.stack([motion.position, motion.velocity, np.abs(motion.velocity)]))
     jerk = rate(log.acceleration, w.stride * w.period)
-    return np.stack([*means, log.acceleration, jerk], axis=1)
+    back = speed - np.abs(v) > 0.02 * speed  # of the way, which noise alone goes back and forth
+    return np.stack([x, v, log.acceleration, jerk, back], axis=1)
 
 
 def _against(
@@ -337,11 +341,11 @@ def _step(columns: Array, force: Array) -> Array:
 
 def _near(own: _Rows, others: Sequence[_Rows]) -> NDArray[np.bool_]:
     """Which rows (n,) of a log are in a state where others have been: in one cell of a grid."""
-    cell, most = 0.5, 1 << 15  # of the RMS of each coordinate; cells on either side of its zero
+    cell, most = 0.5, 1 << 11  # of the RMS of each coordinate; cells on either side of its zero
     states = np.concatenate([own.states, *(r.states for r in others)])
     places = np.clip(np.floor(states / cell), -most, most - 1).astype(np.int64) + most
-    # 16 bits for each of the four coordinates
-    cells = np.bitwise_or.reduce(places << np.array([0, 16, 32, 48]), axis=1)
+    # 12 bits for each of the five coordinates
+    cells = np.bitwise_or.reduce(places << np.array([0, 12, 24, 36, 48]), axis=1)
     return np.asarray(np.isin(cells[: len(own.left)], cells[len(own.left) :]))
 
 

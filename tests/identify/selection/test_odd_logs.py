@@ -269,6 +269,15 @@ def test_a_log_that_alone_shows_what_the_model_lacks_is_not_odd() -> None:
     assert told.dataset.odd is None
 
 
+@pytest.mark.slow  # 10 s
+@pytest.mark.parametrize(("seed", "number"), [(108, 9), (109, 7)])
+def test_a_log_that_alone_turns_back_without_a_rest_is_not_odd(seed: int, number: int) -> None:
+    """Its sines left eight times as much: all of it where the friction turns, where others rest."""
+    case, told = of_silence(seed, number)
+    assert case.spoiled is None
+    assert told.dataset.odd is None
+
+
 @pytest.mark.slow  # 20 s
 @pytest.mark.parametrize(
     ("seed", "number", "lacks", "log", "what"),
