@@ -12,7 +12,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,14 +31,17 @@ import identify
 from benchmarks.second_simulator.two_masses import TwoMasses, wandering
 from identify.analysis.first_model import first_model
 from identify.experiment_design.planting import other_machine
+from identify.fleet.change_point import changes
 from identify.output.answers import Answer, plain
 from identify.output.answers.machine import info_answer
 from identify.output.as_json import json_of
+from identify.view.replay import replay
 from twin.checks import check_log
 from twin.checks.long import log_info
 from twin.experiments.named import EXPERIMENTS
 from twin.export import find_exporter
-from twin.importers.guess import propose
+from twin.importers.guess import EVERY_COLUMN, propose, table_of
+from twin.laws.trials import TrialMotion, acted, legal
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import format_model
 from twin.model.machine import MachineModel
@@ -214,6 +217,65 @@ def of_columns() -> dict[str, Any]:
         return plain({"map": numbers_in(found.map_text({})), "rows": found.rows})
 
 
+def finite(values: np.ndarray) -> list[float]:
+    return values[np.isfinite(values)].tolist()
+
+
+TABLES = {
+    "comma": "time;pos [mm];force [N]\n0,000;1,5;-2,25\n0,001;1,75;-2,5\n0,002;2,0;-3,0\n",
+    "units below": "t\tq\tu\ns\tmm\tA\n0.0\t1.0\t0.1\n0.5\t2.0\t0.2\n1.0\t4.0\t0.4\n",
+    "settings above": "gain,15\nrate,1000\n\ntime,x,f\n0,1e-3,2\n0.001,2e-3,3\n0.002,4e-3,5\n",
+    "bad first": "t,x,f\n0.0,bad,1\n0.1,1.0,2\n0.2,2.0,3\n0.3,3.0,5\n0.4,5.0,8\n",
+    "words apart": "  run time   motor torque\n  0.0        1.25\n  0.1        1.50\n  0.2        2.5\n",
+    "no names": "0.0 1.0 2.0\n0.1 1.5 2.5\n0.2 2.5 4.5\n",
+}
+
+
+def of_tables() -> dict[str, Any]:
+    """What text tables of several forms hold, and under which names."""
+    held: dict[str, Any] = {}
+    with TemporaryDirectory() as folder:
+        for name, text in TABLES.items():
+            path = Path(folder, f"{name}.csv")
+            path.write_text(text, encoding="utf-8")
+            table = table_of(path, EVERY_COLUMN)
+            held[name] = {n: finite(np.asarray(c, float)) for n, c in table.columns.items()}
+    return held
+
+
+def of_laws() -> dict[str, Any]:
+    """What every law of the catalogue does along one motion, each of its strengths at work."""
+    motion = TrialMotion.cycles(0.02, samples=700)
+    made: dict[str, Any] = {}
+    for name, effect in CATALOGUE.items():
+        given = {p.name: p.start or 0.3 if p.strength else p.start for p in effect.parameters}
+        values = legal(effect, given)
+        made[name] = {f"{k}": row.tolist() for k, row in enumerate(acted(effect, values, motion))}
+    return made
+
+
+def of_series() -> dict[str, Any]:
+    """The changes of a series of nights: a step, a night that is off, a slow drift."""
+    rng = np.random.default_rng(8)
+    levels = np.repeat([1.0, 1.2, 0.9], [30, 20, 25]) + 0.02 * rng.standard_normal(75)
+    levels[40] += 0.3
+    told = changes(levels, np.full(75, 1e-5), 0.02, 4.0)
+    return {str(k): asdict(change) for k, change in enumerate(told)}
+
+
+def of_replay() -> dict[str, Any]:
+    """What a viewer of a log and its model draws."""
+    drawn = replay(fit_of_stage().model, stage()[2]["2"], "2")
+    return {
+        name: {
+            "modelled": finite(axis.modelled),
+            "forces": {n: finite(f) for n, f in axis.forces.items()},
+            "strips": {s.label: [*map(finite, s.range)] for s in axis.strips},
+        }
+        for name, axis in drawn.axes.items()
+    }
+
+
 RUNS: dict[str, Callable[[], Any]] = {
     "fit of a stage": fit_of_stage,
     "comparison of a stage": lambda: identify.compare(fit_of_stage().model, stage()[2]),
@@ -234,6 +296,12 @@ RUNS: dict[str, Callable[[], Any]] = {
     "records of a night": of_nights,
     "experiment that decides": lambda: identify.plan(stage_with({}), duration=2.0),
     "first model of a stage": lambda: identify.first_model(stage()[0]),
+    "laws along a motion": of_laws,
+    "tables of text": of_tables,
+    "changes of a series": of_series,
+    "what a viewer draws": of_replay,
+    "friction taken out of a slide": lambda: identify.remove("coulomb_viscous", SLIDER, *slides()),
+    "experiment by logs": lambda: identify.plan(SLIDER, slides()[0], catalogue=FEW, duration=2.0),
 }
 
 

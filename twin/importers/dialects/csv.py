@@ -55,8 +55,9 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     if header is None:
         names: tuple[str, ...] = tuple(str(k + 1) for k in range(width))
         return Layout(head.encoding, style, names, skip, some)
-    plain = len(rows[header]) >= width or style.delimiter is not None
-    names = _names(rows[header] if plain else spaced[header], rows[skip])
+    given = [len(named[header]) for named in (rows, spaced)]
+    several = given[0] != width and (given[1] == width or given[0] < width)  # words a name
+    names = _names(spaced[header] if several else rows[header], rows[skip])
     units = _units(rows[header + 1 : skip], names)
     return Layout(head.encoding, style, names, skip, some, units, header)
 
