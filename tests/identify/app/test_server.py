@@ -111,6 +111,14 @@ def test_an_upload_is_taken_whole_or_not_at_all(app, tmp_path):
     assert (machine / "a <b>.csv").read_bytes() == b"t,x\n"
 
 
+def test_a_job_is_stopped_by_its_number(app):
+    """One that there is not was stopped already; what is no number is refused."""
+    told = asked(app, "/api/stop", "POST", b'{"number": "one"}', **KNOWN)
+    assert told.status == 400
+    assert b"give the number of a job" in told.body
+    assert asked(app, "/api/stop", "POST", b'{"number": 7}', **KNOWN).status == 200
+
+
 @pytest.mark.parametrize("name", ["a/b", "a\\b", "..", ".x", "a\n.csv", "", "x" * 300, "-o"])
 def test_what_is_no_plain_name_of_a_file_is_refused(name):
     with pytest.raises(InputError):

@@ -1,6 +1,7 @@
 """The exported C gives the feedforward of the model, and that makes the model follow."""
 
 import ctypes
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -159,6 +160,14 @@ def test_what_cannot_be_fed_forward_is_told(tmp_path) -> None:
     assert "encoder_ripple" not in made.source
 
 
+def test_what_is_told_to_be_held_nearly_or_not_at_all_is_not_told_to_be_kept() -> None:
+    for axis in AXES.values():
+        (made,) = c_source(MachineModel("one", {"x": axis}, 1.0 / PERIOD)).axes
+        others = {r.part for r in (*made.held.approximated, *made.held.lost)}
+        assert not others & {*made.held.kept}
+        assert others | {*made.held.kept} == {axis.units.mass_name, *axis.names}
+
+
 def test_bands_of_the_last_fit_stand_beside_the_values() -> None:
     stage = load_model("proton_xy", CATALOGUE)
     stage = stage.with_intervals("x", AxisIntervals({"lugre.Fc": (0.27, 0.2912)}, 1.0))
@@ -212,6 +221,19 @@ def test_what_python_says_otherwise_than_c(tmp_path) -> None:
         law(p, s, wanted)
         in_c(*given(p, s, io))
         np.testing.assert_allclose(io, wanted, rtol=1e-14)
+
+
+@needs_compiler
+def test_functions_and_constants_may_be_given_by_their_module(tmp_path) -> None:
+    def law(p, s, io):
+        io[OUT] = math.exp(io[X]) + math.pi * io[V]
+
+    in_c = compiled(tmp_path, law).tried
+    io, wanted = np.zeros(30), np.zeros(30)
+    io[[X, V]] = wanted[[X, V]] = 0.3, -2.0
+    law(None, None, wanted)
+    in_c(*given(np.zeros(1), np.zeros(1), io))
+    np.testing.assert_allclose(io, wanted, rtol=1e-14)
 
 
 TABLE = (0.1, 0.2)

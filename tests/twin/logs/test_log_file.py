@@ -22,6 +22,7 @@ from mcap.reader import make_reader
 from mcap_bytes import of, parsed, parsed_message, pieces, records
 from mcap_protobuf.decoder import DecoderFactory
 
+from twin.errors import InputError
 from twin.logs import FIELDS, AxisLog, Log, read_log, write_log
 
 RATE, COUNT, PER_CHUNK = 3000.0, 45, 7
@@ -93,6 +94,16 @@ def test_the_sections_follow_each_other_with_the_checksums_of_their_bytes(data):
         place += offset.group_length
         assert {p.opcode for p in pieces(data, offset.group_start, place)} == {offset.group_opcode}
     assert place == footer.summary_offset_start == of(data, Opcode.SUMMARY_OFFSET)[0].start
+
+
+def test_a_summary_whose_writer_gave_no_checksum_is_read(data, tmp_path):
+    """Zero says that there is none (MCAP specification, footer)."""
+    crc = of(data, Opcode.FOOTER)[0].end - 4
+    for name, proof in (("without", bytes(4)), ("wrong", b"abcd")):
+        (tmp_path / name).write_bytes(data[:crc] + proof + data[crc + 4 :])
+    assert len(read_log(tmp_path / "without")) == COUNT
+    with pytest.raises(InputError, match="wrong checksum"):
+        read_log(tmp_path / "wrong")
 
 
 def test_every_chunk_holds_one_topic_can_be_read_alone_and_is_indexed(data):
