@@ -115,6 +115,15 @@ def stretches(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)
 
 
+def held_at_extreme(signal: Array, extreme: float, least: int) -> NDArray[np.bool_]:
+    """Which samples (n,) are at an extreme of a signal, to rounding, ``least`` of them at once."""
+    held = np.abs(signal - extreme) <= 1e-9 * np.ptp(signal)
+    for first, end in stretches(held):
+        if end - first < least:
+            held[first:end] = False
+    return np.asarray(held)
+
+
 def white_noise(signal: Array) -> float:
     """RMS of the white part of a smooth signal (n,): its fourth difference holds little else.
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from identify.analysis.first_values import LENGTHS, FirstValues, first_values
 from identify.dataset.bodies import Bodies, bodies_along
+from identify.dataset.clipped import clipped_in
 from identify.dataset.coordinates import excitation
 from identify.dataset.given_logs import is_driven, none_informative, require_samples, telling_in
 from identify.dataset.motion import LONGEST_BLOCK, SHORTEST_BLOCK, Motion, motion_of
@@ -151,10 +152,12 @@ def _first_values(
     bodies: by log, of a joint. mass: kg, where it is known.
     """
     ripples = ripples_of_widest(logs.values(), axis)
+    clipped = {} if any(bodies.values()) else clipped_in(logs, axis)
     # Long blocks hide an axis that swings within them, and of short ones noise hides more.
     for longest in (LONGEST_BLOCK, SHORTEST_BLOCK):
         motions = [
-            motion_of(log, axis, n, (), longest, ripples, bodies.get(n)) for n, log in logs.items()
+            motion_of(log, axis, n, (), longest, ripples, bodies.get(n), clipped=clipped.get(n))
+            for n, log in logs.items()
         ]
         found = first_values(motions, mass)
         if found.mass is not None:

@@ -115,7 +115,7 @@ def _rows(
 ) -> tuple[Array, Array]:
     """The columns (6, n) and the force (n,) N by test functions, of those without a rest.
 
-    Of all, where the axis comes to rest within nearly every one.
+    And whose force was recorded throughout. Of all, where nearly every one holds a rest.
     """
     columns, going = [], []
     for m in motions:
@@ -125,7 +125,7 @@ def _rows(
         columns.append(np.concatenate([w.acceleration(m.velocity)[None], means]))
         # part of a test function, from which what static friction holds is in its force
         at_rest = 0.02
-        going.append(w.mean(stands(m).astype(float)) < at_rest)
+        going.append(w.mean((stands(m) | m.cut_off).astype(float)) < at_rest)
     rows, kept = np.hstack(columns), np.concatenate(going)
     rows = rows[:, kept] if np.count_nonzero(kept) >= ROWS else rows
     return rows[:-1], rows[-1]

@@ -67,6 +67,13 @@ class Dataset:
         parts = {log.motion.name: 1.0 - float(np.mean(log.reached)) for log in others}
         return {name: part for name, part in parts.items() if part > 0.0}
 
+    @property
+    def clipped(self) -> dict[str, float]:
+        """Part of each log, 0..1 by name, in which more force acted than was recorded."""
+        return {
+            log.motion.name: float(log.clipped.mean()) for log in self.logs if log.clipped.any()
+        }
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(self.having(role))} {role.value}" for role in Role)
         return f"<Dataset of {self.axis}: logs: {counts}>"

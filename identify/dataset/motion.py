@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from identify.dataset.blocks import Blocks, Columns, OtherAxis, Track, samples_of
 from identify.dataset.bodies import Bodies
@@ -54,7 +55,8 @@ class Motion:
     logged, as_logged (n * samples a block,) N; None where it was not. bodies: of a joint of a
     mechanism, over as many samples as raw; None for a plain axis, whose mass is all that it moves.
     path: what laws with memory follow; None: the readings as they are. slip: what a model moves
-    such laws beside it at rest.
+    such laws beside it at rest. clipped: (n * samples a block,), where the force that acted was
+    more than was recorded (identify.dataset.clipped); None where nowhere.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Motion:
     slip: Slip | None = None
     channels: tuple[str, ...] = ()
     count: float = 0.0
+    clipped: NDArray[np.bool_] | None = None
 
     def __repr__(self) -> str:
         return (
@@ -111,6 +114,7 @@ class Motion:
             as_logged=None if self.as_logged is None else self.as_logged[at],
             path=None if self.path is None else self.path.during(at.start, at.stop),
             slip=None,
+            clipped=None if self.clipped is None else self.clipped[at],
             beside={a: o.during(blocks) for a, o in self.beside.items()},
         )
 
@@ -133,6 +137,7 @@ class Motion:
             beside={a: replace(o, samples=samples) for a, o in self.beside.items()},
             path=self.path and replace(self.path.during(0, count * samples), samples=samples),
             slip=None,
+            clipped=None if self.clipped is None else self.clipped[at],
         )
 
     def with_force_ahead(self, shift: float) -> Motion:
@@ -192,6 +197,14 @@ class Motion:
         """Velocity (n,) m/s that laws with memory follow."""
         own = self.velocity if self.path is None else self.path.velocity
         return own if self.slip is None else own + self.slip.velocity
+
+    @property
+    def cut_off(self) -> NDArray[np.bool_]:
+        """In which blocks (n,) more force acted than was recorded."""
+        count = self.signals.shape[1]
+        if self.clipped is None:
+            return np.zeros(count, bool)
+        return np.asarray(self.clipped.reshape(count, -1).any(axis=1))
 
     @property
     def acceleration(self) -> Array:
@@ -309,13 +322,14 @@ def motion_of(
     ripples: tuple[float, ...] | None = None,
     bodies: Bodies | None = None,
     encoder_noise: float = np.inf,
+    clipped: NDArray[np.bool_] | None = None,
 ) -> Motion:
     """The motion of one axis of a log.
 
     machine: the axes of the machine; on one of two axes others that were logged do not matter.
     longest_block: s; a noisy position asks for long blocks. ripples: m, sought where None. bodies:
     of a joint. encoder_noise: m rms, where other logs tell it; more than it asks for no longer
-    blocks, in which a reversal is smeared.
+    blocks, in which a reversal is smeared. clipped: as Motion has it, of all samples.
     Raises InputError where the axis is not in the log, does not move, or is too short.
     """
     _require_motion(log, axis, name)
@@ -353,6 +367,7 @@ def motion_of(
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(whole)),
         path=Path(columns.readings, block, log.period, min(noise, encoder_noise)),
+        clipped=None if clipped is None else clipped[:whole],
     )
 
 

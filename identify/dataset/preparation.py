@@ -11,6 +11,7 @@ from functools import cache, partial
 from itertools import islice
 
 from identify.dataset.bodies import Bodies, bodies_along
+from identify.dataset.clipped import Mask, clipped_in
 from identify.dataset.coordinates import Covered
 from identify.dataset.dataset import Dataset, Role
 from identify.dataset.given_logs import (
@@ -95,10 +96,11 @@ def _of_axis(
     ripples = ripples_of_widest(going[Role.TRAINING].values(), name)
     deciders = [*going[Role.TRAINING].values(), *going[Role.SELECTION].values()]
     noise = noise_of_most(deciders, name)
+    clipped = {} if bodies else _clipped(going, name)
 
     def motions_at(*roles: Role) -> Callable[[float | None], tuple[list[Motion], ...]]:
         logs = [going[r] for r in roles]
-        made = cache(partial(_motions, logs, name, machine, ripples, noise, bodies))
+        made = cache(partial(_motions, logs, name, machine, ripples, noise, bodies, clipped))
         return partial(_long_enough, made)
 
     deciding = motions_at(Role.TRAINING, Role.SELECTION)
@@ -131,6 +133,15 @@ def _kept(axis: AxisModel, logs: Sequence[Log]) -> float | None:
     longest = max(len(log) * log.period for log in logs)
     length = axis.test_function
     return length if length and shortest <= length < longest else None
+
+
+def _clipped(going: Given, axis: str) -> dict[str, Mask]:
+    """Where more force acted than was recorded, by log; test logs tell that of none but them."""
+    test = going[Role.TEST]
+    deciders = {**going[Role.TRAINING], **going[Role.SELECTION]}
+    among_all = clipped_in({**deciders, **test}, axis) if test else {}
+    theirs = {name: where for name, where in among_all.items() if name in test}
+    return {**theirs, **clipped_in(deciders, axis)}
 
 
 def _begun(
@@ -166,13 +177,16 @@ def _motions(
     ripples: tuple[float, ...],
     noise: float,
     bodies: Mapping[str, Bodies],
+    clipped: Mapping[str, Mask],
     longest: float,
 ) -> tuple[list[Motion], ...]:
     """Motions of each part of the logs, in blocks of at most a length (s); ripples, noise: m."""
 
     def motion(given: tuple[str, Log]) -> Motion:
         name, log = given
-        return motion_of(log, axis, name, machine, longest, ripples, bodies.get(name), noise)
+        return motion_of(
+            log, axis, name, machine, longest, ripples, bodies.get(name), noise, clipped.get(name)
+        )
 
     made = iter(spread(motion, [given for some in parts for given in some.items()]))
     return tuple([*islice(made, len(some))] for some in parts)

@@ -83,6 +83,11 @@ class PreparedLog:
         position = self.test_function.mean(self.motion.position)
         return np.asarray((position >= low) & (position <= high))
 
+    @cached_property
+    def clipped(self) -> NDArray[np.bool_]:
+        """In which test functions (n,) more force acted at some instant than was recorded."""
+        return np.asarray(self.test_function.mean(self.motion.cut_off.astype(float)) != 0.0)
+
     @property
     def informative_share(self) -> Array:
         """How much of each test function (n,) tells of a model: not what balances by itself."""
@@ -239,13 +244,14 @@ def independent(logs: Sequence[PreparedLog], sticks: bool) -> int:
 
 
 def moving(logs: Sequence[PreparedLog], sticks: bool) -> NDArray[np.bool_]:
-    """Which test functions carry information: those within reach.
+    """Which test functions carry information: those within reach whose force was recorded.
 
     With static friction, those without standstill.
     """
     masks = []
     for log in logs:
         mask = np.ones(len(log), bool) if log.reach == EVERYWHERE else log.reached
+        mask &= ~log.clipped
         if sticks:
             still = stands(log.motion).astype(float)
             # 0.02 of a test function, as at a reversal without a rest

@@ -257,7 +257,10 @@ def prefers(one: Judged, other: Judged) -> bool:
         least = RULE.least_bic
         # Where models are E apart in evidence, the squares of what they leave tell so with a t of
         # sqrt(E)/2 on average: per sample they differ by d^2 + 2 d e, which scatters by 2 d sigma.
-        sure = any(g.t >= 0.5 * least**0.5 and e >= least for g, e in zip(groups, most, strict=True))
+        least_of_squares = 0.5 * least**0.5
+        sure = any(
+            g.t >= least_of_squares and e >= least for g, e in zip(groups, most, strict=True)
+        )
         return sure and min(g.t for g in groups) > -least_t(1)
     telling = [g for g in groups if g.apart >= RULE.least_part]
     clear = (g.t >= least_t(1) and g.part >= RULE.least_part for g in telling)

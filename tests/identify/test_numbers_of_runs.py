@@ -226,7 +226,7 @@ TABLES = {
     "units below": "t\tq\tu\ns\tmm\tA\n0.0\t1.0\t0.1\n0.5\t2.0\t0.2\n1.0\t4.0\t0.4\n",
     "settings above": "gain,15\nrate,1000\n\ntime,x,f\n0,1e-3,2\n0.001,2e-3,3\n0.002,4e-3,5\n",
     "bad first": "t,x,f\n0.0,--,--\n0.1,1.0,2\n0.2,2.0,3\n0.3,3.0,5\n0.4,5.0,8\n",
-    "words apart": "  run time   motor torque\n  0.0        1.25\n  0.1        1.50\n  0.2        2.5\n",
+    "words apart": "  run time   motor torque\n  0.0        1.25\n  0.1   1.5\n  0.2   2.5\n",
     "no names": "0.0 1.0 2.0\n0.1 1.5 2.5\n0.2 2.5 4.5\n",
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from twin.checks.axis import READINGS, Axis
 from twin.checks.breaks import held
 from twin.checks.report import WHOLE, Fault, LogFinding, Place, Severity
-from twin.signals import Array, median, stretches
+from twin.signals import Array, held_at_extreme, median, stretches
 
 # A proposed import map has this word in the comment of a line that the file does not prove.
 # Whoever knows it to be right takes the word away.
@@ -403,12 +404,10 @@ def _piled(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | No
 
 def _exactly(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Start of the first interval at the extreme and length of all, s."""
-    starts, lengths = _runs(_at(extreme, force))
     # s at one value exactly; five samples at least, where so long is fewer
-    stuck = lengths >= max(5e-3 * axis.sample_rate, 5, 2 * axis.force_held)
-    if not stuck.any():
-        return None
-    return starts[stuck][0] / axis.sample_rate, lengths[stuck].sum() / axis.sample_rate
+    least = max(ceil(5e-3 * axis.sample_rate), 5, 2 * axis.force_held)
+    held = np.flatnonzero(held_at_extreme(force, extreme, least))
+    return (held[0] / axis.sample_rate, len(held) / axis.sample_rate) if len(held) else None
 
 
 def _but_for_noise(axis: Axis, height: Array) -> tuple[float, float] | None:

@@ -216,6 +216,11 @@ def prepared_in_words(dataset: Dataset) -> tuple[str, ...]:
         for log, part in dataset.beyond.items()
         if part > 0.05  # part of a log beyond the training logs that a reader should know of
     ]
+    said += [
+        f"{log}: {percent(part)} of this log is left out: its {words('force')} stays at its "
+        "extreme there, where the motion asks for more: record the force that acts"
+        for log, part in dataset.clipped.items()
+    ]
     return tuple(said)
 
 
