@@ -72,30 +72,37 @@ class Score:
     """A change against the model without it, on the training logs and on logs not fitted to.
 
     control: the part that all but one in twenty of its controls stay below. among: of how many
-    changes it was chosen. in_turn: whether all other logs, two or more, prove it, choosing in turn;
-    then it stands where those that choose see it too and are not sure of it alone.
+    changes it was chosen. in_turn: where all other logs, two or more, prove it, choosing in turn,
+    the least that it takes of any of them. Then it stands where those that choose see it too and
+    are not sure of it alone; and where they hardly excite it, by the others.
     """
 
     training: Taken
     other: Taken
     control: float = 0.0
     among: int = 1
-    in_turn: bool = False
+    in_turn: Taken | None = None
+
+    @property
+    def judging(self) -> Taken:
+        """What it takes of logs not fitted to: those that choose, or the others in turn."""
+        hardly_excite = self.other.apart < RULE.least_part
+        return self.in_turn if self.in_turn and hardly_excite else self.other
 
     @property
     def t(self) -> float:
         """The smaller of the two."""
-        return min(self.training.t, self.other.t)
+        return min(self.training.t, self.judging.t)
 
     @property
     def together(self) -> float:
         """The t of both groups of logs together (S. A. Stouffer)."""
-        return float((self.training.t + self.other.t) / np.sqrt(2.0))
+        return float((self.training.t + self.judging.t) / np.sqrt(2.0))
 
     @property
     def part(self) -> float:
         """The smaller of the two."""
-        return min(self.training.part, self.other.part)
+        return min(self.training.part, self.judging.part)
 
     @property
     def is_seen(self) -> bool:
@@ -105,7 +112,7 @@ class Score:
     @property
     def refused(self) -> str | None:
         """Why the change is not accepted, in words; None where it is."""
-        if self.in_turn and self.is_seen:
+        if self.in_turn is not None and self.is_seen:
             return None
         if self.part < RULE.least_part:
             return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
@@ -225,6 +232,11 @@ def left_on(fit: Fit, logs: Sequence[PreparedLog]) -> Array:
     return np.where(kept, residual(fit.axis, logs), np.nan)
 
 
+def least_of(turns: Sequence[Score]) -> Taken:
+    """The least that a change takes of logs that choose in turn."""
+    return min((s.other for s in turns), key=lambda taken: taken.t)
+
+
 def least_t(among: int) -> float:
     """The t that chance reaches once in twenty times in the best of so many (Bonferroni)."""
     return NormalDist().inv_cdf(1.0 - RULE.chance / max(among, 1))
@@ -255,12 +267,7 @@ def prefers(one: Judged, other: Judged) -> bool:
             most_evidence(other.other, one.other, other.other_floor),
         )
         least = RULE.least_bic
-        # Where models are E apart in evidence, the squares of what they leave tell so with a t of
-        # sqrt(E)/2 on average: per sample they differ by d^2 + 2 d e, which scatters by 2 d sigma.
-        least_of_squares = 0.5 * least**0.5
-        sure = any(
-            g.t >= least_of_squares and e >= least for g, e in zip(groups, most, strict=True)
-        )
+        sure = any(g.t >= least**0.5 and e >= least for g, e in zip(groups, most, strict=True))
         return sure and min(g.t for g in groups) > -least_t(1)
     telling = [g for g in groups if g.apart >= RULE.least_part]
     clear = (g.t >= least_t(1) and g.part >= RULE.least_part for g in telling)

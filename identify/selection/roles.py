@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from identify.selection.acceptance import Judged, Score, score
+from identify.selection.acceptance import Judged, Score, least_of, score
 from identify.selection.findings import Finding
 from identify.selection.search import Found
 from identify.selection.trying import FEWEST_TURNS, refitted_on
@@ -47,18 +47,15 @@ def with_turns(found: Found, findings: Sequence[Finding]) -> tuple[Finding, ...]
 
     All logs testify: which of them chooses is no property of the machine.
     """
-    asked = [f for f in findings if not f.doubt and f.refused and f.score.is_seen]
+    asked = [f for f in findings if not f.doubt and f.refused]
     finals = _in_turn(found) if asked else []
     scores = {f.effect: _scores(found, f, finals) for f in asked}
     proved = {
-        effect
+        effect: least_of(each)
         for effect, each in scores.items()
         if len(each) >= FEWEST_TURNS and all(map(_proved, each))
     }
-    return tuple(
-        replace(f, score=replace(f.score, in_turn=True)) if f.effect in proved else f
-        for f in findings
-    )
+    return tuple(replace(f, score=replace(f.score, in_turn=proved.get(f.effect))) for f in findings)
 
 
 def _in_turn(found: Found) -> list[Judged]:
@@ -104,7 +101,9 @@ def _unsure(findings: Sequence[Finding]) -> Iterator[RoleDependent]:
     """Of the findings those that other logs alone prove, choosing in turn."""
     for f in findings:
         if f.score.in_turn:
-            yield RoleDependent(f.effect, False, f.score.part, f.score.t)
+            groups = f.score.training, f.score.other
+            part, t = (min(some) for some in zip(*((g.part, g.t) for g in groups), strict=True))
+            yield RoleDependent(f.effect, False, part, t)
 
 
 def _gained(found: Found) -> Iterator[RoleDependent]:

@@ -23,7 +23,7 @@ from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.variable_projection import basis_beside, fit_multistart
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, least_t, prefers, score
+from identify.selection.acceptance import Judged, Taken, least_t, prefers, score
 from identify.selection.beside_kin import pairs_beside
 from identify.selection.candidates import Candidate, candidate_of, ordered
 from identify.selection.changes import (
@@ -317,9 +317,22 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     first = simplest([t for t in tied if not isinstance(t.change, Reshaped)] or tied)
     if most not in lowering and follows(first, most):
         tied.append(most)
+    tied += [t for t in tried if _takes_as_much(t, first)]
     kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
     others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
     return [Step(first, others, kin=alike)]
+
+
+def _takes_as_much(unsure: Tried, proved: Tried) -> bool:
+    """Whether a law that is not proved by itself takes as much of either group of logs.
+
+    That something is there, the other one has proved; which of the two it is, they do not tell.
+    """
+    its, own = unsure.candidate.score, proved.candidate.score
+    if its is None or own is None or its.accepted or unsure.candidate.doubt:
+        return False
+    more = its.training.part >= own.training.part and its.other.part >= own.other.part
+    return more and its.part > its.control and not isinstance(unsure.change, Reshaped)
 
 
 def _of_position(tried: Sequence[Tried]) -> list[Step]:
@@ -406,11 +419,14 @@ def _are_needed(way: Change, both: Judged, judged: Judged) -> bool:
     return not is_of_friction(alone, both, way.effect) and _is_needed(way, alone, both)
 
 
-def _is_needed(change: Change, without: Judged, fit: Judged) -> bool:
-    """Whether a change is accepted beside a fit without it, which leaves more than noise."""
+def _is_needed(change: Change, without: Judged, fit: Judged, in_turn: Taken | None = None) -> bool:
+    """Whether a change is accepted beside a fit without it, which leaves more than noise.
+
+    in_turn: where other logs, choosing in turn, proved it.
+    """
     if without.at_floor:
         return False
-    plain = score(without, fit)
+    plain = replace(score(without, fit), in_turn=in_turn)
     return plain.accepted and replace(plain, control=control(change, without, fit)).accepted
 
 
@@ -459,9 +475,10 @@ def _needed(
             if may and not fallen():
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
-            needed = _is_needed(step.change, without, judged)
-            without = fitted_anew(without)
-            if needed and _is_needed(step.change, without, judged):
+            own = step.tried.candidate.score
+            needed = partial(_is_needed, fit=judged, in_turn=own.in_turn if own else None)
+            is_needed, without = needed(step.change, without), fitted_anew(without)
+            if is_needed and needed(step.change, without):
                 continue
             judged = without
         kept = [s for s in steps if s is not step]

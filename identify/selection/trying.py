@@ -5,7 +5,6 @@ Of all changes for the search; of a single one for whoever asks for it.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,7 +18,7 @@ from identify.estimation.residual_noise import foretells_aliases
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
-from identify.selection.acceptance import Judged
+from identify.selection.acceptance import Judged, Score, least_of
 from identify.selection.ahead import Ahead
 from identify.selection.candidates import Candidate, candidate_of, noise_candidate
 from identify.selection.changes import (
@@ -135,13 +134,15 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         return []
     turns = own.exchanged
     found: dict[str, Tried] = {}
-    proofs = Counter[str]()
+    proofs: dict[str, list[Score]] = {}
     for dataset in turns:
         there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
         tried = tried_beside(there, trial, within(progress, "other logs choosing"))[1]
         proved = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
         laws = [t for t in proved if not t.candidate.is_noise]
-        proofs.update({t.change.name for t in laws if t.candidate.supported})
+        sure = {t.change.name: t.candidate.score for t in laws if t.candidate.supported}
+        for name, score in sure.items():
+            proofs.setdefault(name, []).extend([score] if score else [])
         for t in laws:
             found.setdefault(t.change.name, t)
 
@@ -149,10 +150,10 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
         among = (len(turns) + 1) * score.among if score else 1
         again = judged_change(judged, t.screening, fit, among)
-        candidate = again.candidate
-        if candidate.score is None or not FEWEST_TURNS <= proofs[t.change.name] == len(turns):
+        candidate, proved = again.candidate, proofs.get(t.change.name, [])
+        if candidate.score is None or not FEWEST_TURNS <= len(proved) == len(turns):
             return again
-        sure = replace(candidate.score, in_turn=True)
+        sure = replace(candidate.score, in_turn=least_of(proved))
         return replace(again, candidate=replace(candidate, score=sure))
 
     return [as_they_are(t) for t in found.values()]

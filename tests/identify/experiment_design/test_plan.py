@@ -75,7 +75,7 @@ CASES = {
     # At one high speed the dry friction is one number, and so is its asymmetry.
     "asymmetry": Case(
         stage_of(effect("stribeck", Fc=0.285, Fs=0.335, v0=0.01, sigma2=0.018)),
-        {"constant_force": {"F0": 2.6e-3}, "asymmetric_friction": {"coulomb": -0.0091}},
+        {"constant_force": {"F0": 5.2e-3}, "asymmetric_friction": {"coulomb": -0.0182}},
         Passes("x", span=0.3, speed=0.25, repeats=1),
     ),
 }

@@ -101,11 +101,6 @@ def test_two_that_distort_each_other_are_found_together() -> None:
     assert found.final.at_floor
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a free curve of the friction (part 1.00, t 25, control 0.21) is accepted before two "
-    "laws are asked together: alone the friction's has part 0.63, t 0.8, the constant no refit",
-)
 def test_two_laws_are_asked_together_before_a_free_curve_takes_both() -> None:
     wavy = {"c1": 0.2, "c2": -0.1, "c3": 0.2, "c4": 0.1, "c5": -0.2}
     both = {"constant_force": OFFSET, "position_dependent_friction": wavy}
