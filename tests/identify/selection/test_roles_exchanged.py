@@ -12,6 +12,8 @@ from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 from benchmarks.drives import CATALOGUE, HIDDEN
 from benchmarks.roles import of_machine
 from benchmarks.second_simulator.drives import DRIVES, Recorder, log_of
+from benchmarks.second_simulator.recordings import recordings
+from benchmarks.silence import cases
 from identify import diagnose
 from identify.analysis.first_model import first_model
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
@@ -144,3 +146,21 @@ def test_a_lag_that_one_order_refuses_alone_is_followed_to_the_friction_that_hid
         assert any("actuator_lag" in family for family in families)
         assert any("presliding_hysteresis" in f or "lugre" in f for f in families)
         assert found.final.ratio < 1.5
+
+
+@pytest.mark.slow  # 20 s
+def test_a_log_that_hardly_excites_a_law_does_not_refuse_it() -> None:
+    """A slow one chose: of a load that swings at 18 times the floor it said that it takes nothing.
+
+    The three others prove it in turn.
+    """
+    case = cases(110, 13)[12]
+    drive = DRIVES[case.drive]
+    logs = recordings(drive, case.plants[1], case.recorder, case.seed, None, case.which)
+    training = {name: logs[name] for name in ("speeds", "again", "sines")}
+    model = first_model(training, "drive", CATALOGUE)
+    catalogue = few("coulomb_viscous", "flexible_mode", "cogging", "spring", "backlash")
+    found = diagnose(model, training, {"slow": logs["slow"]}, catalogue=catalogue).axes["q"]
+    assert found.named == ("flexible_mode",)
+    assert [(law.effect, law.named) for law in found.depends_on_roles] == [("flexible_mode", False)]
+    assert found.final.ratio < 1.5
