@@ -391,7 +391,7 @@ def _together(
         beside, seconds, _ = tried_beside(
             way.judged, with_it, within(progress, f"beside {way.change.name}")
         )
-        if not (then := _accepted(beside, seconds)):
+        if not (then := _accepted(beside, seconds) or _of_position(seconds)):
             continue
         both, second = then[0].tried.judged, then[0]
         if _are_needed(way.change, both, judged):

@@ -11,7 +11,11 @@ from built_fits import built, built_fit, tried
 from machines import CATALOGUE, PROTON, tracked
 from planted_logs import SLIDE, Ride, asked, begun, few, having
 
+from benchmarks.second_simulator.drives import DRIVES as MACHINES
+from benchmarks.second_simulator.recordings import recordings
+from benchmarks.silence import cases
 from identify import diagnose
+from identify.analysis.first_model import first_model
 from identify.dataset.preparation import datasets
 from identify.estimation.fit import fit_axis
 from identify.estimation.variable_projection import absent_effects
@@ -266,3 +270,19 @@ def test_a_load_that_turns_behind_a_gear_is_told_from_a_spring_and_from_cogging(
     assert found.named == (name,)
     if name == "unbalance":
         assert found.final.axis[name].values == pytest.approx(values, rel=0.02)
+
+
+@pytest.mark.slow  # 10 s
+def test_a_law_is_proved_together_with_a_force_of_position_that_may_be_any() -> None:
+    """Two coggings, the longer of less than three cycles: at 137 floors nothing was named."""
+    case = cases(110, 5)[4]
+    logs = recordings(MACHINES[case.drive], case.plants[1], case.recorder, case.seed, None, "moves")
+    one, other, test = ({name: logs[name]} for name in ("moves", "sines", "again"))
+    catalogue = few("coulomb_viscous", "cogging", "spring", "force_constant_ripple", "lugre")
+    model = first_model(one, "drive", catalogue)
+    found = diagnose(model, one, other, test, catalogue=catalogue).axes["q"]
+    assert found.named == ("cogging", "cogging_2")
+    assert all(f.kind is FindingKind.RESEMBLES for f in found.findings)
+    periods = sorted(f.parameters["p"] for f in found.findings)
+    assert periods == pytest.approx([np.pi / 6.0, 2.0 * np.pi / 7.0], rel=1e-3)
+    assert found.final.error < 0.05 * found.base.error
