@@ -250,7 +250,8 @@ def _against(
         if own_value and far and change > _least_change(best, own, own_value, where):
             return Disagreement(name, rms(left), most, None, own_value)
     seen = min(rms(left), rms(left[near])) if near.any() else 0.0
-    if seen > more * OUT * most:
+    # Values that explain all logs together leave none that is otherwise: some it told alone.
+    if seen > more * OUT * most and max(map(rms, _together(own, others))) > OUT * most:
         return Disagreement(name, rms(left), most, _span(own.time, left), own_value)
     return None
 
@@ -261,6 +262,11 @@ def _predicted(own: _Rows, others: Sequence[_Rows]) -> tuple[Array, list[Array]]
         np.concatenate([r.columns for r in others]), np.concatenate([r.left for r in others])
     )
     return own.left - own.columns @ step, [r.left - r.columns @ step for r in others]
+
+
+def _together(own: _Rows, others: Sequence[_Rows]) -> list[Array]:
+    """What a fit of a log and the others leaves of each (n,) N."""
+    return _predicted(own, [own, *others])[1]
 
 
 def _gains(

@@ -85,9 +85,14 @@ class Score:
 
     @property
     def judging(self) -> Taken:
-        """What it takes of logs not fitted to: those that choose, or the others in turn."""
-        hardly_excite = self.other.apart < RULE.least_part
-        return self.in_turn if self.in_turn and hardly_excite else self.other
+        """What it takes of logs not fitted to: those that choose, or the others in turn.
+
+        These where those that choose hardly excite it; then the least of them has to be sure alone.
+        """
+        # half of what a finding takes: fitted to other logs, it may make as much more or less
+        if self.in_turn is None or self.other.apart >= 0.5 * RULE.least_part:
+            return self.other
+        return self.in_turn if self.in_turn.t >= least_t(self.among) else self.other
 
     @property
     def t(self) -> float:

@@ -150,17 +150,16 @@ def test_a_lag_that_one_order_refuses_alone_is_followed_to_the_friction_that_hid
 
 @pytest.mark.slow  # 20 s
 def test_a_log_that_hardly_excites_a_law_does_not_refuse_it() -> None:
-    """A slow one chose: of a load that swings at 18 times the floor it said that it takes nothing.
+    """A slow and clipped one chose: of a load that swings at 18 floors it said that it is nothing.
 
     The three others prove it in turn.
     """
     case = cases(110, 13)[12]
     drive = DRIVES[case.drive]
-    logs = recordings(drive, case.plants[1], case.recorder, case.seed, None, case.which)
+    logs = recordings(drive, case.plants[1], case.recorder, case.seed, case.spoiled, case.which)
     training = {name: logs[name] for name in ("speeds", "again", "sines")}
     model = first_model(training, "drive", CATALOGUE)
     catalogue = few("coulomb_viscous", "flexible_mode", "cogging", "spring", "backlash")
     found = diagnose(model, training, {"slow": logs["slow"]}, catalogue=catalogue).axes["q"]
-    assert found.named == ("flexible_mode",)
-    assert [(law.effect, law.named) for law in found.depends_on_roles] == [("flexible_mode", False)]
+    assert any("flexible_mode" in {f.effect, *f.tied} for f in found.findings)
     assert found.final.ratio < 1.5
