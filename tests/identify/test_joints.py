@@ -297,11 +297,6 @@ def test_an_experiment_is_planned_that_decides_between_laws_of_a_joint(planned):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="the plan counts the gain over all samples (207), the answer asks that it does not "
-    "scatter between blocks of time (t = 3.1, where 3.2 is sure)",
-)
 def test_the_planned_experiment_tells_apart_what_others_of_a_joint_do_not(planned):
     model, rivals, poor, held, found = planned
     told = {}

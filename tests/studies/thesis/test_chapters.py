@@ -179,7 +179,7 @@ def test_each_law_fits_its_own_data_and_not_the_other_ones() -> None:
     dry, bristles = ratios
     assert len(found.numbers["laws"]) == 2
     assert all(ratio < 1.3 for law in ratios for ratio in ratios[law][law].values() if ratio > 0)
-    assert ratios[dry][bristles]["break-away"] > 2.0
+    assert ratios[dry][bristles]["pre-sliding loops"] > 2.0  # at rest, a dry law may hold any force
     assert ratios[bristles][dry]["velocity map"] > 2.0
     assert found.numbers["by_law"][bristles]["loop_open_by"] > 1e-3
     assert found.words[0].startswith("each friction fits its own data to 0.9")
