@@ -48,3 +48,15 @@ def follows(law: Tried, curve: Tried) -> bool:
     if more is None or not 0.0 < more.part < RULE.least_part or more.t < least_t(1):
         return False
     return not score(curve.judged, both.judged).accepted
+
+
+def takes_as_much(unsure: Tried, proved: Tried) -> bool:
+    """Whether a law that is not proved by itself takes as much of either group of logs.
+
+    That something is there, the other one has proved; which of the two it is, they do not tell.
+    """
+    its, own = unsure.candidate.score, proved.candidate.score
+    if its is None or own is None or its.accepted or unsure.candidate.doubt:
+        return False
+    more = its.training.part >= own.training.part and its.other.part >= own.other.part
+    return more and its.part > its.control and not isinstance(unsure.change, Reshaped)

@@ -37,7 +37,7 @@ from identify.selection.changes import (
 )
 from identify.selection.controls import ControlTest
 from identify.selection.held import has_collapsed, is_held
-from identify.selection.law_or_curve import NEARLY, follows, laws_for
+from identify.selection.law_or_curve import NEARLY, follows, laws_for, takes_as_much
 from identify.selection.of_friction import IS_FRICTION, is_of_friction
 from identify.selection.trying import (
     LEADERS,
@@ -185,6 +185,8 @@ def _search(found: Found, catalogue: Catalogue, progress: Progress) -> Found:
             exchanged = tried_exchanged(judged, trial, step)
             new = _accepted(judged, exchanged) or _together(judged, last, exchanged, trial, step)
             new = new or _beside_kin(judged, trial, step) or _of_position([*last, *exchanged])
+        if not new and (led := _by_a_curve(judged, steps, first, trial, step)):
+            judged, steps, new = led
         if not new:
             break
         exchanged = []
@@ -317,22 +319,31 @@ def _accepted(judged: Judged, tried: Sequence[Tried]) -> list[Step]:
     first = simplest([t for t in tied if not isinstance(t.change, Reshaped)] or tied)
     if most not in lowering and follows(first, most):
         tied.append(most)
-    tied += [t for t in tried if _takes_as_much(t, first)]
+    tied += [t for t in tried if takes_as_much(t, first)]
     kin = (t for t in lowering if t.candidate.part >= NEARLY * best.candidate.part)
     others, alike = (tuple(t for t in some if t is not first) for some in (tied, kin))
     return [Step(first, others, kin=alike)]
 
 
-def _takes_as_much(unsure: Tried, proved: Tried) -> bool:
-    """Whether a law that is not proved by itself takes as much of either group of logs.
-
-    That something is there, the other one has proved; which of the two it is, they do not tell.
-    """
-    its, own = unsure.candidate.score, proved.candidate.score
-    if its is None or own is None or its.accepted or unsure.candidate.doubt:
-        return False
-    more = its.training.part >= own.training.part and its.other.part >= own.other.part
-    return more and its.part > its.control and not isinstance(unsure.change, Reshaped)
+def _by_a_curve(
+    judged: Judged, steps: tuple[Step, ...], first: Judged, trial: Beside, progress: Progress
+) -> tuple[Judged, tuple[Step, ...], list[Step]] | None:
+    """The fit and the steps with a free curve for a law that is level, where more is proved so."""
+    for step in reversed(steps):
+        curves = [t for t in step.tied if isinstance(t.change, Reshaped)]
+        axis = step.change.undone(judged.fit.axis, first.fit.axis)
+        if not curves or axis is None:
+            continue
+        curve, without = curves[0], refitted_on(axis, judged)
+        fit = replace(curve.change.refit(without, curve.screening), begun=judged.fit.begun)
+        names = tuple((curve.change if s is step else s.change).name for s in steps)
+        asked = replace(trial, taken=names)
+        beside, tried, _ = tried_beside(Judged(fit, judged.dataset), asked, progress)
+        if new := _accepted(beside, tried):
+            level = (step.tried, *curves[1:], *(t for t in step.tied if t not in curves))
+            led = replace(step, tried=replace(curve, judged=beside), tied=level)
+            return beside, tuple(led if s is step else s for s in steps), new
+    return None
 
 
 def _of_position(tried: Sequence[Tried]) -> list[Step]:
