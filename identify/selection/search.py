@@ -330,8 +330,10 @@ def _by_a_curve(
 ) -> tuple[Judged, tuple[Step, ...], list[Step]] | None:
     """The fit and the steps with a free curve for a law that is level, where more is proved so."""
     for step in reversed(steps):
-        curves = [t for t in step.tied if isinstance(t.change, Reshaped)]
         axis = step.change.undone(judged.fit.axis, first.fit.axis)
+        known = axis.names if axis else ()  # a law has one curve in its place
+        there = [t for t in step.tied if t.change.name in known]
+        curves = [t for t in there if isinstance(t.change, Reshaped)]
         if not curves or axis is None:
             continue
         curve, without = curves[0], refitted_on(axis, judged)
