@@ -117,11 +117,11 @@ def stretches(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 def held_at_extreme(signal: Array, extreme: float, least: int) -> NDArray[np.bool_]:
     """Which samples (n,) are at an extreme of a signal, to rounding, ``least`` of them at once."""
-    held = np.abs(signal - extreme) <= 1e-9 * np.ptp(signal)
-    for first, end in stretches(held):
-        if end - first < least:
-            held[first:end] = False
-    return np.asarray(held)
+    held = stretches(np.abs(signal - extreme) <= 1e-9 * np.ptp(signal))
+    first, end = held[held[:, 1] - held[:, 0] >= least].T
+    edges = np.zeros(len(signal) + 1, np.int8)
+    edges[first], edges[end] = 1, -1  # two stretches do not touch
+    return np.cumsum(edges[:-1]) > 0
 
 
 def white_noise(signal: Array) -> float:
