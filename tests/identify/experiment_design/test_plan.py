@@ -121,6 +121,7 @@ def test_after_the_planned_experiment_the_ambiguity_is_gone(name, truth):
     assert not after.ambiguous_with or truth == SIMPLER
 
 
+@pytest.mark.slow  # 5 s
 def test_an_ambiguous_diagnosis_gives_the_experiment_that_decides():
     case = CASES["delay"]
     machine = case.machine("actuator_delay")

@@ -54,6 +54,7 @@ def test_a_law_that_takes_as_much_is_preferred_to_a_curve(true, beside, preferre
     assert first.tied == ()
 
 
+@pytest.mark.slow  # 8 s
 def test_a_law_that_a_curve_betters_by_too_little_to_be_found_is_told_as_level_with_it() -> None:
     judged, every, curve = tried(CABLED, waves)
     (law,) = laws_for(curve, judged, every)

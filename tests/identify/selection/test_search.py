@@ -92,6 +92,7 @@ def test_what_imitated_another_is_dropped_when_that_is_there() -> None:
     assert found.final.at_floor
 
 
+@pytest.mark.slow  # 3 s
 def test_two_that_distort_each_other_are_found_together() -> None:
     """Neither is accepted alone: each leaves what the other makes of the motion."""
     catalogue = (*BOTH, "quadratic_drag", "spring")

@@ -63,6 +63,7 @@ def test_what_came_near_is_compared_again_beside_the_other_of_a_pair() -> None:
     assert found.findings[0].parameters["tau"] == pytest.approx(plant.lag, rel=0.06)
 
 
+@pytest.mark.slow  # 4 s
 def test_a_late_law_is_found_beside_the_friction_that_hid_it() -> None:
     """The force without the friction tells how late it is, while the bristle is missing still."""
     drive = DRIVES["cart"]
