@@ -20,7 +20,7 @@ from identify.dataset.prepared_log import on_blocks, total_force
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from twin.effects import Catalogue
-from twin.logs import Log
+from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 
 Array = NDArray[np.float64]
@@ -83,6 +83,13 @@ def logged(
         u = free - np.append(total_force(on_blocks(axis), motion), 0.0)
     u = u + noise * rng.standard_normal(len(x))
     return log_of(RATE, x + 1e-9 * rng.standard_normal(len(x)), u)
+
+
+def with_force(log: Log, change: Callable[[Array], Array]) -> Log:
+    """The log with another force."""
+    own = log.axes["x"]
+    columns = {**own.columns, "force": change(own.columns["force"].copy())}
+    return replace(log, axes={"x": AxisLog(columns, own.units)})
 
 
 HARDWARE = Hardware(

@@ -42,8 +42,10 @@ def _exceeded(
     logs: Mapping[str, Log], axis: str, held: Mapping[str, Array], length: float
 ) -> Iterator[str]:
     """The logs whose motion asks for more than their extremes, by test functions of a length, s."""
-    none = np.zeros(1)
-    rows = {name: _rows(log, axis, held.get(name, none), length) for name, log in logs.items()}
+    rows = {
+        name: _rows(log, axis, held.get(name, np.zeros(len(log))), length)
+        for name, log in logs.items()
+    }
     free = np.concatenate([r[(s == 0.0) & ways] for r, s, ways in rows.values()])
     if len(free) < FEWEST:
         return
@@ -76,7 +78,7 @@ def _rows(log: Log, axis: str, sides: Array, length: float) -> tuple[Array, Arra
     w = TestFunction.at_least(length, log.period)
     position, force = log.axes[axis].position, log.axes[axis].force
     velocity = between(position, log.period)
-    means = w.mean(np.stack([force[:-1], velocity, np.sign(velocity), position[:-1]]))
-    rows = np.stack([means[0], w.acceleration(velocity), *means[1:], np.ones(means.shape[1])], 1)
-    held = w.mean(sides[:-1]) if len(sides) == len(force) else np.zeros(len(rows))
-    return rows, held, np.abs(means[2]) > 0.98  # of its time
+    way = np.sign(velocity)
+    means = w.mean(np.stack([force[:-1], velocity, way, position[:-1], sides[:-1]]))
+    rows = np.stack([means[0], w.acceleration(velocity), *means[1:4], np.ones(means.shape[1])], 1)
+    return rows, means[4], np.abs(means[2]) > 0.98  # of its time

@@ -55,7 +55,10 @@ def with_turns(found: Found, findings: Sequence[Finding]) -> tuple[Finding, ...]
         for effect, each in scores.items()
         if len(each) >= FEWEST_TURNS and all(map(_proved, each))
     }
-    return tuple(replace(f, score=replace(f.score, in_turn=proved.get(f.effect))) for f in findings)
+    return tuple(
+        replace(f, score=replace(f.score, in_turn=proved[f.effect])) if f.effect in proved else f
+        for f in findings
+    )
 
 
 def _in_turn(found: Found) -> list[Judged]:

@@ -134,15 +134,14 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         return []
     turns = own.exchanged
     found: dict[str, Tried] = {}
-    proofs: dict[str, list[Score]] = {}
+    proofs: list[dict[str, Score]] = []  # of each turn by law
     for dataset in turns:
         there = refitted_on(judged.fit.axis, Judged(judged.fit, dataset))
         tried = tried_beside(there, trial, within(progress, "other logs choosing"))[1]
         proved = (t for t in tried if t.candidate.supported or may_be_itself(t.candidate))
         laws = [t for t in proved if not t.candidate.is_noise]
-        sure = {t.change.name: t.candidate.score for t in laws if t.candidate.supported}
-        for name, score in sure.items():
-            proofs.setdefault(name, []).extend([score] if score else [])
+        sure = (t for t in laws if t.candidate.supported)
+        proofs.append({t.change.name: s for t in sure if (s := t.candidate.score)})
         for t in laws:
             found.setdefault(t.change.name, t)
 
@@ -150,7 +149,8 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         score, fit = t.candidate.score, refitted_on(t.judged.fit.axis, judged).fit
         among = (len(turns) + 1) * score.among if score else 1
         again = judged_change(judged, t.screening, fit, among)
-        candidate, proved = again.candidate, proofs.get(t.change.name, [])
+        candidate, name = again.candidate, t.change.name
+        proved = [turn[name] for turn in proofs if name in turn]
         if candidate.score is None or not FEWEST_TURNS <= len(proved) == len(turns):
             return again
         sure = replace(candidate.score, in_turn=least_of(proved))

@@ -255,7 +255,7 @@ def of_laws() -> dict[str, Any]:
 
 
 def of_series() -> dict[str, Any]:
-    """The changes of a series of nights: a step, a night that is off, a slow drift."""
+    """The changes of a series of nights: two steps, and a night that is off."""
     rng = np.random.default_rng(8)
     levels = np.repeat([1.0, 1.2, 0.9], [30, 20, 25]) + 0.02 * rng.standard_normal(75)
     levels[40] += 0.3

@@ -385,18 +385,13 @@ def _goes_in_steps(axis: Axis) -> bool:
     return float(largest.sum()) >= most * float(changes.sum())
 
 
-def _at(extreme: float, force: Array) -> NDArray[np.bool_]:
-    """Which samples of a force (n,) are at its extreme, to rounding."""
-    return np.asarray(np.abs(force - extreme) <= 1e-9 * np.ptp(force))
-
-
 def _piled(axis: Axis, force: Array, extreme: float) -> tuple[float, float] | None:
     """Likewise, of a rough force whose samples have values of their own, but for many there.
 
     It comes to its limit and leaves it again from sample to sample.
     """
     few, own = 20, 0.5  # samples that are no pile; part of all that no other one equals
-    at_it = np.flatnonzero(_at(extreme, force))
+    at_it = np.flatnonzero(held_at_extreme(force, extreme, 1))
     if len(at_it) <= few or len(np.unique(force)) < own * len(force):
         return None
     return at_it[0] / axis.sample_rate, len(at_it) / axis.sample_rate

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from planted_logs import RATE, SLIDE, Ride, few, having, logged
+from planted_logs import RATE, SLIDE, Ride, few, having, logged, with_force
 
 import identify
 from identify.dataset.clipped import clipped_in
@@ -19,10 +17,8 @@ MODEL = MachineModel("m", {"x": SLIDE}, RATE)
 
 def clipped(log: Log, part: float) -> Log:
     """The log with its force cut off at a part of its largest."""
-    own = log.axes["x"]
-    most = part * np.abs(own.force).max()
-    columns = {**own.columns, "force": np.clip(own.force, -most, most)}
-    return replace(log, axes={"x": AxisLog(columns, own.units)})
+    most = part * np.abs(log.axes["x"].force).max()
+    return with_force(log, lambda force: np.clip(force, -most, most))
 
 
 def limited(ride: Ride, limit: float) -> Log:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from built_fits import built_dataset
-from planted_logs import RATE, SLIDE, Array, Ride, few, having, logged
+from planted_logs import RATE, SLIDE, Array, Ride, few, having, logged, with_force
 
 import identify
 from benchmarks.second_simulator.drives import DRIVES
@@ -22,7 +21,7 @@ from identify.output.words.odd import odd_in_words, with_odd
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.checks.report import CheckReport, Fault
 from twin.effects import Catalogue
-from twin.logs import AxisLog, Log
+from twin.logs import Log
 from twin.model.machine import AxisModel, MachineModel
 
 RIDES = {f"run{i}": Ride(20 + i) for i in range(4)}
@@ -37,12 +36,6 @@ def runs(machine: AxisModel = SLIDE, **others: AxisModel) -> dict[str, Log]:
 
 def fitted(logs: dict[str, Log]) -> Dataset:
     return identify.fit(MODEL, logs).datasets["x"]
-
-
-def with_force(log: Log, change: Callable[[np.ndarray], np.ndarray]) -> Log:
-    own = log.axes["x"]
-    columns = {**own.columns, "force": change(own.columns["force"].copy())}
-    return replace(log, axes={"x": AxisLog(columns, own.units)})
 
 
 def test_logs_of_one_machine_agree() -> None:
