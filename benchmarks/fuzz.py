@@ -24,7 +24,7 @@ from mcap.writer import CompressionType, Writer
 from benchmarks.figures import Figure, Target
 from twin.effects import load_catalogue
 from twin.errors import InputError
-from twin.importers import import_log, load_mapping, told_of
+from twin.importers import import_log, import_notes, load_mapping
 from twin.logs import AxisLog, Log, read_log, recover_log, write_log
 from twin.model.file import find_model, load_model
 
@@ -223,7 +223,7 @@ def _imported_as(path: Path, mapping: Path, log: Log) -> bool:
     found, written = import_log(path, load_mapping(mapping)), log.axes["x"]
     x = found.axes["x"]
     if len(found) != len(log):
-        return bool(told_of(found)) and bool(np.isin(x.force, written.force).all())
+        return bool(import_notes(found)) and bool(np.isin(x.force, written.force).all())
     return np.array_equal(x.force, written.force) and np.allclose(
         x.position, 1e-3 * written.position, rtol=1e-12, atol=0.0
     )

@@ -18,7 +18,7 @@ from identify.dataset.preparation import datasets
 from studies.curves.dynamic_friction import DYNAMIC, dynamic_part_free, fit_bristles
 from studies.thesis.models import overall
 from studies.thesis.reproduction import reproduce
-from studies.thesis.study import friction_of, machine
+from studies.thesis.shared import friction_of, machine
 from twin.experiments.kinds import OpenLoopSine
 from twin.model.parameters import ParameterReference, read
 from twin.simulation.simulate import simulate

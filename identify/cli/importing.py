@@ -81,7 +81,7 @@ def _logged(
     """Write a log that a map made. proofs: what it makes of each axis."""
     from identify.output.answers.machine import ImportAnswer
     from twin.checks import check_assumed
-    from twin.importers import told_of
+    from twin.importers import import_notes
     from twin.importers.guess import doubts_of
     from twin.importers.proposal.doubts import doubts_as_metadata
     from twin.logs import write_log
@@ -94,7 +94,7 @@ def _logged(
     )
     told = (*doubts_of(known), *doubts.values())
     warnings = [
-        *told_of(log),
+        *import_notes(log),
         *(f"{mapping}: warning: {doubt}" for doubt in told),
         *(f"{out}: warning: {finding}" for finding in unsure),
     ]

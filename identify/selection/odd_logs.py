@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement
@@ -29,26 +30,31 @@ def without_odd_log(
 
     conclude: what a fit of some logs comes to.
     """
+
+    @cache  # in turns this log and that, each set of logs is asked once
+    def without(log: str | None) -> Conclusion:
+        return conclude(*_others(base, dataset, log))
+
     odd = odd_in(base.axis, dataset)
     for _ in range(MOST_TURNS):
         left_out = _spoiling(odd, dataset)
-        ended = conclude(*_others(base, dataset, left_out))
+        ended = without(left_out)
         odd = _odd_beside(ended, dataset)
         if left_out == _spoiling(odd, dataset):
             break
     else:
-        ended, odd = conclude(base, dataset), None  # in turns this log and that: it is no log
+        ended, odd = without(None), None  # in turns this log and that: it is no log
     unexplained = _is_unexplained(ended)
     if odd is None or _spoiling(odd, dataset) is None:
         if not unexplained:
             return ended, odd
         if _may_be_all(odd):
             return ended, None
-        return _without_suspect(base, dataset, conclude) or (ended, odd)
+        return _without_suspect(base, dataset, without) or (ended, odd)
     if ended.findings or (odd.is_sure and not unexplained):
         return ended, odd
     # Nothing was found without it: it may be the one that shows what the model lacks.
-    whole = conclude(base, dataset)
+    whole = without(None)
     beside = _odd_beside(whole, dataset)
     if whole.findings and _spoiling(beside, dataset) is None:
         return whole, beside
@@ -77,7 +83,7 @@ def _is_unexplained(ended: Conclusion) -> bool:
 
 
 def _without_suspect(
-    base: Fit, dataset: Dataset, conclude: Callable[[Fit, Dataset], Conclusion]
+    base: Fit, dataset: Dataset, without: Callable[[str | None], Conclusion]
 ) -> tuple[Conclusion, Disagreement] | None:
     """What the logs but the worst of them come to, where it disagrees beside what they prove.
 
@@ -88,7 +94,7 @@ def _without_suspect(
     """
     if (name := suspect(base.axis, dataset)) is None:
         return None
-    ended = conclude(*_others(base, dataset, name))
+    ended = without(name)
     odd = _odd_beside(ended, dataset)
     if not ended.findings or odd is None or odd.log != name:
         return None

@@ -13,7 +13,7 @@ import numpy as np
 
 from identify.dataset.motion import motion_of
 from studies.curves.velocity_map import VelocityMap
-from studies.thesis.study import Array, Numbers, followed, seed_of
+from studies.thesis.shared import Array, Numbers, followed, seed_of
 from twin.experiments.kinds import Staircase
 from twin.experiments.trajectory import Setpoint
 from twin.logs import Log

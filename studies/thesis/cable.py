@@ -13,8 +13,8 @@ from identify.estimation.evidence import rms
 from studies.curves.cable_force import CableForce, cable_force
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
-from studies.thesis.study import Array, Found, Numbers
+from studies.thesis import shared
+from studies.thesis.shared import Array, Found, Numbers
 from twin.experiments.kinds import Passes
 from twin.logs import Log
 from twin.model.machine import AxisModel
@@ -29,15 +29,15 @@ ROLLER_PITCH = 34e-3  # m, printed in the thesis
 
 def run(small: bool, rng: np.random.Generator) -> Found:
     """Run the passes on the first axis of the stage, which has a cable and rollers."""
-    model, name, axis = study.machine("proton_xy")
+    model, name, axis = shared.machine("proton_xy")
     passes = Passes(name, span=SPAN, speed=SPEED, repeats=3 if small else REPEATS)
     simulator = ReducedSimulator if small else MujocoSimulator
-    log = simulate(model, passes, seed=study.seed_of(rng), simulator=simulator)
+    log = simulate(model, passes, seed=shared.seed_of(rng), simulator=simulator)
     found = cable_force(model, {"passes": log}, axis=name)
     true, pitch = planted(axis, log, name, found.position), None
     if found.pitch is not None:
         periods = [f.values[p.name] for f in axis.effects for p in f.effect.parameters if p.period]
-        pitch = study.recovered(periods[0], [found.pitch.value], "m", ROLLER_PITCH)
+        pitch = shared.recovered(periods[0], [found.pitch.value], "m", ROLLER_PITCH)
         pitch["standard_error"] = found.pitch.standard_error
     off = found.force - true
     numbers = {
@@ -54,7 +54,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
 def planted(axis: AxisModel, log: Log, name: str, position: Array) -> Array:
     """The force (k,) N that the machine's smooth forces of position had at these places."""
     truth = log.truth[name]
-    force = np.sum([truth[f.effect.name] for f in study.of_position(axis)], axis=0)
+    force = np.sum([truth[f.effect.name] for f in shared.of_position(axis)], axis=0)
     order = np.argsort(truth["position"])
     return np.interp(position, truth["position"][order], force[order])
 

@@ -28,8 +28,8 @@ from identify.estimation.open_loop import Beginning, OpenLoopRun, measured_begin
 from studies.curves.dynamic_friction import dynamic_part_free, fit_dynamic_part
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
-from studies.thesis.study import Array, Found, Numbers, friction_of
+from studies.thesis import shared
+from studies.thesis.shared import Array, Found, Numbers, friction_of
 from twin.effect import Kind
 from twin.experiments.kinds import OpenLoopSine, Reversals
 from twin.logs import AxisLog, Log
@@ -49,9 +49,9 @@ WAYS = ("from_rest", "beginning_estimated")
 
 def run(small: bool, rng: np.random.Generator) -> Found:
     """Record the sine at places of the track, and identify the dynamic part at each."""
-    model, name, axis = study.machine("track")
-    quiet = model.with_axis(name, study.with_hardware(axis, current_noise=0.0))
-    places, duration = study.places(1 if small else study.PLACES), 6.0 if small else 30.0
+    model, name, axis = shared.machine("track")
+    quiet = model.with_axis(name, shared.with_hardware(axis, current_noise=0.0))
+    places, duration = shared.places(1 if small else shared.PLACES), 6.0 if small else 30.0
     known = dynamic_part_free(axis)
     found = []
     for place in map(float, places):
@@ -61,7 +61,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     first = float(places[0])
     whole = sine(model, name, first, duration, rng)
     reversals = Reversals(name, repeats=REVERSALS, amplitude=REVERSAL, dwell=0.02, at=(first,))
-    records = {"closed_loop": study.recorded(model, reversals, rng), "open_loop": whole}
+    records = {"closed_loop": shared.recorded(model, reversals, rng), "open_loop": whole}
     parts = zip(("first_period", "after"), np.transpose(errors, (1, 2, 0)), strict=True)
     numbers = {
         "position": places, "position_unit": "m", "unit": "m",
@@ -86,7 +86,7 @@ def _recovered(known: AxisModel, found: Array) -> dict[str, Numbers]:
     where = free_parameters(known)
     columns = zip(where, read(known, where), found.T, strict=True)
     return {
-        c.parameter.name: study.recovered(true, values, c.parameter.unit)
+        c.parameter.name: shared.recovered(true, values, c.parameter.unit)
         for c, true, values in columns
     }
 
@@ -117,13 +117,13 @@ def sine(
     model: MachineModel, name: str, place: float, duration: float, rng: np.random.Generator
 ) -> Log:
     """The thesis's open-loop sine, which carries the cable's force as well (chapter "cable")."""
-    cable = replace(model.axes[name], effects=study.of_position(model.axes[name]))
+    cable = replace(model.axes[name], effects=shared.of_position(model.axes[name]))
     force = force_along(cable, np.array([place]), np.zeros(1), 1.0, Kind.FORCE)
     pure = OpenLoopSine(name, LATE + duration, AMPLITUDE, PERIOD, at=(place,))
     setpoint = pure.setpoint(model, rng)
     setpoint = setpoint.part(0, len(setpoint))
     setpoint = replace(setpoint, force=setpoint.force - force)
-    return study.followed(model, setpoint, rng, {axis: Controller() for axis in model.axes})
+    return shared.followed(model, setpoint, rng, {axis: Controller() for axis in model.axes})
 
 
 def late(log: Log, name: str) -> Log:

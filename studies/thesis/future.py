@@ -29,9 +29,9 @@ from identify.selection.nonparametric import fit_nonparametric
 from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
+from studies.thesis import shared
 from studies.thesis.mixed_friction import EQUAL, mixed, mixture, mixture_in_words
-from studies.thesis.study import CATALOGUE, Array, Found, Numbers, friction_of
+from studies.thesis.shared import CATALOGUE, Array, Found, Numbers, friction_of
 from twin.effect import DRY, DT, ELEMENTS, IO_SIZE, Kind
 from twin.experiments.kinds import Staircase
 from twin.logs import AxisLog, Log
@@ -51,11 +51,11 @@ AT_ONCE = 1e-12  # s, of a step in which no state moves
 def run(small: bool, rng: np.random.Generator) -> Found:
     """On the machine with elements; the first friction is that of the stage."""
     duration, counts = (6.0, (1, 4)) if small else (20.0, tuple(range(1, 9)))
-    memory, name, axis = study.machine("memory")
+    memory, name, axis = shared.machine("memory")
     memory = replace(memory, sample_rate=RATE)
-    _, _, stage = study.machine("proton_xy")
+    _, _, stage = shared.machine("proton_xy")
     first, own = friction_of(stage), friction_of(axis)
-    dataset, test = study.four_logs(memory, duration, rng, memory)
+    dataset, test = shared.four_logs(memory, duration, rng, memory)
     fits = with_elements(axis, dataset, counts)
     tried = compared(fits, test)
     chosen = max(tried, key=lambda e: e["delta_bic"])["elements"]
@@ -66,7 +66,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     more = {name: len(fit.scaling.where) - len(base.scaling.where) for name, fit in beside.items()}
     slow, aged = near_zero(small, rng), aging(60.0 if small else 600.0, rng)
     made = axis.with_effect(mixed(own.values, first.values, EQUAL))
-    logs = study.four_logs(memory.with_axis(name, made), duration, rng, memory)
+    logs = shared.four_logs(memory.with_axis(name, made), duration, rng, memory)
     numbers = {
         "elements": {"planted": int(own.values[ELEMENTS]), "found": chosen, "tried": tried},
         "residuals": [
@@ -104,7 +104,7 @@ def compared(fits: Mapping[int, Fit], test: Dataset) -> list[Numbers]:
             "delta_bic": evidence(
                 first.residual, fit.residual, ELEMENT_COST * (count - least)
             ).delta_bic,
-            "error_over_noise_floor": study.over_floor(fit, test),
+            "error_over_noise_floor": shared.over_floor(fit, test),
         }
         for count, fit in fits.items()
     ]
@@ -112,18 +112,18 @@ def compared(fits: Mapping[int, Fit], test: Dataset) -> list[Numbers]:
 
 def near_zero(small: bool, rng: np.random.Generator) -> Numbers:
     """Friction at speeds near zero: planted, by the map, and by the whole law fitted."""
-    model, name, axis = study.machine("simulation")
+    model, name, axis = shared.machine("simulation")
     model = replace(model, sample_rate=RATE)
     speeds, longest = ((3e-4, 1e-3), 5.0) if small else ((1e-5, 3e-5, 1e-4, 3e-4, 1e-3), 60.0)
     mapped, logs = [], {}
     for speed in speeds:
         moves = Staircase(name, speeds=(speed,), span=SLOW_SPAN, longest_plateau=longest)
         label = f"{speed:g} m/s"
-        logs[label] = study.recorded(model, moves, rng)
+        logs[label] = shared.recorded(model, moves, rng)
         motion = motion_of(logs[label], name, label, ripples=())  # a simulated reading has none
         mapped.append(float(VelocityMap.of(axis, motion).towards(1.0).friction.mean()))
     dataset = datasets(model, logs, {})[name]
-    fit = fit_axis(study.begun(axis, dataset, friction_of(axis).effect), dataset.training)
+    fit = fit_axis(shared.begun(axis, dataset, friction_of(axis).effect), dataset.training)
     planted, fitted = (
         np.array([steady_friction(a, 0.0, v) for v in speeds]) for a in (axis, fit.axis)
     )
@@ -136,14 +136,14 @@ def aging(duration: float, rng: np.random.Generator) -> Numbers:
 
     On the whole run its effects are fitted, those that age from their start values.
     """
-    model, name, axis = study.machine("aging")
+    model, name, axis = shared.machine("aging")
     young = replace(axis, effects=tuple(f for f in axis.effects if not ages(f)))
     machines = [MachineModel(model.name, {name: one}, model.sample_rate) for one in (axis, young)]
-    logs = [study.recorded(machine, "tracking", rng, duration) for machine in machines]
+    logs = [shared.recorded(machine, "tracking", rng, duration) for machine in machines]
     level, steady = (drift(m, young, log) for m, log in zip(machines, logs, strict=True))
     whole_run, aged = datasets(machines[0], {"run": logs[0]}, {})[name], axis
     for f in filter(ages, axis.effects):
-        aged = study.begun(aged, whole_run, f.effect)
+        aged = shared.begun(aged, whole_run, f.effect)
     whole = fit_axis(aged, whole_run.training)
     where = (f"{c.effect}.{c.parameter.name}" for c in whole.scaling.where)
     half = dict(zip(where, half_widths(whole).tolist(), strict=True))
@@ -151,7 +151,7 @@ def aging(duration: float, rng: np.random.Generator) -> Numbers:
     for f in filter(ages, axis.effects):
         for p, true in f.values.items():
             label, found = f"{f.effect.name}.{p}", whole.axis[f.effect.name].values[p]
-            parameters[label] = study.recovered(true, [found], f.effect.parameter(p).unit)
+            parameters[label] = shared.recovered(true, [found], f.effect.parameter(p).unit)
             parameters[label]["half_width_90"] = half.get(label)
     return {"aging": level, "without": steady, "parameters": parameters}
 

@@ -24,8 +24,8 @@ from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.intervals import half_widths
 from identify.output.numbers import spaced
 from identify.selection.trying import try_effect
-from studies.thesis import study
-from studies.thesis.study import Numbers, friction_of
+from studies.thesis import shared
+from studies.thesis.shared import Numbers, friction_of
 from twin.curve import FRICTION_CURVES
 from twin.effect import OUT, Effect, Kind, Parameter
 from twin.effects.lugre import EFFECT as FORGETS
@@ -93,7 +93,7 @@ def mixture(
     far above the noise floor; true: None where the machine's friction is no mixture. elements: fits
     of numbers of them.
     """
-    alone = [fit_axis(study.begun(axis, dataset, effect), dataset.training) for effect in PARTS]
+    alone = [fit_axis(shared.begun(axis, dataset, effect), dataset.training) for effect in PARTS]
     forgets, remembers = (friction_of(fit.axis).values for fit in alone)
     tried = try_effect(alone[0], dataset, EFFECT).fit
     begun = fit_axis(axis.with_effect(mixed(remembers, forgets, EQUAL)), dataset.training)
@@ -108,9 +108,9 @@ def mixture(
             "printed": None,
         },
         "error_over_noise_floor": {
-            **{friction_of(fit.axis).effect.name: study.over_floor(fit, test)
+            **{friction_of(fit.axis).effect.name: shared.over_floor(fit, test)
                for fit in (*alone, both)},
-            "elements": {count: study.over_floor(fit, test) for count, fit in elements.items()},
+            "elements": {count: shared.over_floor(fit, test) for count, fit in elements.items()},
         },
     }  # fmt: skip
 

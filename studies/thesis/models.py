@@ -27,9 +27,9 @@ from identify.output.blocks import Block
 from identify.output.numbers import spaced
 from studies.drawing import BLUE
 from studies.telling import Line, Panel, picture, table
-from studies.thesis import study
+from studies.thesis import shared
 from studies.thesis.behaviours import LEG, LOOP, RATE, behaviours, characteristics, turning
-from studies.thesis.study import Array, Found, Numbers, friction_of
+from studies.thesis.shared import Array, Found, Numbers, friction_of
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted, MachineModel
 
@@ -48,8 +48,8 @@ ACROSS = 4  # pictures side by side
 
 def run(small: bool, rng: np.random.Generator) -> Found:
     """Plant each friction in a machine, and fit every other to its logs."""
-    model, name, axis = study.machine("simulation")
-    effects, starts = (study.frictions()[:2], 1) if small else (study.frictions(), STARTS)
+    model, name, axis = shared.machine("simulation")
+    effects, starts = (shared.frictions()[:2], 1) if small else (shared.frictions(), STARTS)
     known = friction_of(axis).values
     machines = {e.name: replace(axis, effects=(like(e, known),)) for e in effects}
     numbers: Numbers = {"laws": list(machines), "error_over_noise_floor": {}, "by_law": {}}
@@ -60,13 +60,13 @@ def run(small: bool, rng: np.random.Generator) -> Found:
         logs = behaviours(stage, rng)
         numbers["traits"][law] = characteristics(stage, logs, rng)
         dataset = datasets(stage, logs, {}, TEST_FUNCTION)[name]
-        fits = {e.name: timed(study.begun(machine, dataset, e), dataset) for e in effects}
+        fits = {e.name: timed(shared.begun(machine, dataset, e), dataset) for e in effects}
         spent.append([took for _, took in fits.values()])
         numbers["error_over_noise_floor"][law] = {
             fitted: by_log(fit, tuple(logs)) for fitted, (fit, _) in fits.items()
         }
         loops[law] = loop(machine, LOOP), loop(machine, NESTED)
-        right = share_right(study.begun(machine, dataset, effect), dataset, starts, rng)
+        right = share_right(shared.begun(machine, dataset, effect), dataset, starts, rng)
         numbers["by_law"][law] = {
             "right_starts": right, "starts": starts, "step_time": cost(machine), "time_unit": "s",
             "loop_open_by": loops[law][0].gap, "nested_loops_open_by": loops[law][1].gap,
@@ -89,7 +89,7 @@ def like(effect: Effect, known: Mapping[str, float]) -> Fitted:
 
 def noisy(model: MachineModel, name: str, axis: AxisModel) -> MachineModel:
     """A machine of that axis alone, with the chapter's noise."""
-    axis = study.with_hardware(
+    axis = shared.with_hardware(
         axis, encoder_noise=READING_NOISE, force_constant=1.0, current_noise=FORCE_NOISE
     )
     return MachineModel(model.name, {name: axis}, RATE)

@@ -19,7 +19,7 @@ from identify.output.report.page import Section, page
 from studies.drawing import drawing_style
 from studies.telling import tables
 from studies.thesis import cable, dynamic, future, models, residuals, simulation, track, twin
-from studies.thesis.study import Chapter, Found
+from studies.thesis.shared import Chapter, Found
 from twin.errors import InputError
 from twin.files import write_atomically
 from twin.parallel import Progress, parallel, silent

@@ -21,8 +21,8 @@ from identify.output.numbers import spaced
 from identify.output.shown.residual import residual_test_blocks
 from identify.selection.diagnosis import diagnose_axis
 from identify.validation.whiteness import ResidualTests, loop_of, residual_tests
-from studies.thesis import study
-from studies.thesis.study import CATALOGUE, Found, Numbers, friction_of
+from studies.thesis import shared
+from studies.thesis.shared import CATALOGUE, Found, Numbers, friction_of
 from twin.effects import Catalogue
 from twin.model.machine import AxisModel, Fitted
 from twin.model.units import LINEAR
@@ -35,13 +35,13 @@ def run(small: bool, rng: np.random.Generator) -> Found:
 
     In small frictions alone are tried.
     """
-    machine, name, axis = study.machine("memory")
-    _, _, stage = study.machine("proton_xy")
+    machine, name, axis = shared.machine("memory")
+    _, _, stage = shared.machine("proton_xy")
     planted, first = friction_of(axis), friction_of(stage)
     model = machine.with_axis(name, axis.with_effect(first))
-    given, test = study.four_logs(machine, 8.0 if small else 20.0, rng, model)
+    given, test = shared.four_logs(machine, 8.0 if small else 20.0, rng, model)
     dataset, base = fit_aligned(model.axes[name], given)
-    found = diagnose_axis(base, dataset, Catalogue(study.frictions()) if small else CATALOGUE)
+    found = diagnose_axis(base, dataset, Catalogue(shared.frictions()) if small else CATALOGUE)
     before = left_by(base, realigned(test, dataset.channel_delay).training)
     after = left_by(found.final, realigned(test, found.dataset.channel_delay).training)
     tests = {"before": before[1], "after": after[1]}
@@ -83,7 +83,7 @@ def beside_planted(planted: Fitted, found: AxisModel) -> dict[str, Numbers]:
         return {}
     values = found[planted.effect.name].values
     return {
-        p.name: study.recovered(planted.values[p.name], [values[p.name]], p.unit)
+        p.name: shared.recovered(planted.values[p.name], [values[p.name]], p.unit)
         for p in planted.effect.parameters
         if p.name not in planted.fixed and not p.fixed
     }

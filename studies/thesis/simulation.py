@@ -25,8 +25,8 @@ from studies.curves.friction_curve import StribeckCurve, fit_stribeck
 from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, ORANGE, Picture
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
-from studies.thesis.study import SIDES, Array, Found, Numbers, friction_of
+from studies.thesis import shared
+from studies.thesis.shared import SIDES, Array, Found, Numbers, friction_of
 from twin.engine import engine
 from twin.experiments.kinds import Reversals, Staircase
 from twin.logs import AxisLog, Log
@@ -65,7 +65,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     """Run the study on a machine whose friction has the thesis's parameters."""
     speeds, span, repeats, trials, ratios = SMALL if small else WHOLE
     simulator = ReducedSimulator if small else MujocoSimulator
-    model, name, axis = study.machine("simulation")
+    model, name, axis = shared.machine("simulation")
     values, effect = friction_of(axis).values, friction_of(axis).effect
     maps = []
     for speed in speeds:
@@ -82,7 +82,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
     for snr, each in zip(ratios, rows, strict=True):
         tried[snr] = dict(zip(PRINTED, np.array(each).T, strict=True))
         by_snr[f"{snr:g}"] = {
-            p: study.recovered(values[p], tried[snr][p], effect.parameter(p).unit, printed)
+            p: shared.recovered(values[p], tried[snr][p], effect.parameter(p).unit, printed)
             for p, printed in PRINTED.items()
         }
     true = StribeckCurve(*(values[p] for p in STATIC))

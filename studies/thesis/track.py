@@ -26,8 +26,8 @@ from studies.curves.friction_curve import NAMES, fit_stribeck, stribeck_through
 from studies.curves.velocity_map import VelocityMap
 from studies.drawing import BLUE, GREY, ORANGE, Picture
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
-from studies.thesis.study import SIDES, Array, Found, Numbers
+from studies.thesis import shared
+from studies.thesis.shared import SIDES, Array, Found, Numbers
 from twin.effect import Kind
 from twin.experiments.kinds import Staircase
 from twin.logs import Log
@@ -48,8 +48,8 @@ SIDEWAYS = 1.5  # mm, between the marks of the two ways, which would hide each o
 
 def run(small: bool, rng: np.random.Generator) -> Found:
     """Measure the friction of a machine at each place, in both ways."""
-    model, name, axis = study.machine("track")
-    where = study.places(2 if small else study.PLACES)
+    model, name, axis = shared.machine("track")
+    where = shared.places(2 if small else shared.PLACES)
     # way -> direction -> at each place: values (4,), half widths (4,), planted (4,)
     rows: dict[str, dict[str, list[Array]]] = {
         way: {side: [] for side in SIDES.values()} for way in ("map", "fit")
@@ -95,7 +95,7 @@ def moves(
     for speed in (s for s in (FEW if small else SPEEDS) if s <= fastest):
         speeds = (speed,) * (repeats if speed > BRISK else 1)
         stairs = Staircase(name, speeds=speeds, span=SPAN, longest_plateau=1e4, at=(place,))
-        logs[f"{speed:g} m/s"] = study.recorded(model, stairs, rng)
+        logs[f"{speed:g} m/s"] = shared.recorded(model, stairs, rng)
     return logs
 
 

@@ -17,9 +17,9 @@ from identify.output.words.fit import agreement_in_words, causes_in_words, diffe
 from identify.validation.agreement import Agreement, agreement
 from studies.drawing import BLUE, GREY
 from studies.telling import Line, Panel, picture
-from studies.thesis import study
+from studies.thesis import shared
 from studies.thesis.following import closed_loop_errors, identified, twin_of
-from studies.thesis.study import CATALOGUE, Found
+from studies.thesis.shared import CATALOGUE, Found
 from twin.model.machine import Fitted, MachineModel
 from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
 
@@ -36,12 +36,12 @@ EMPS = {
 
 def run(small: bool, rng: np.random.Generator) -> Found:
     """On the first axis of the stage, whose dry friction is drawn anew."""
-    model, name, axis = study.machine("proton_xy")
+    model, name, axis = shared.machine("proton_xy")
     model = MachineModel(model.name, {name: axis}, model.sample_rate)
     machine = drawn(model, name, rng)
     own = machine.axes[name]
     heavier = machine.with_axis(name, replace(own, mass=own.mass * (1.0 + HEAVIER)))
-    logs = [study.recorded(each, "tracking", rng, 6.0 if small else 20.0)
+    logs = [shared.recorded(each, "tracking", rng, 6.0 if small else 20.0)
              for each in (machine, heavier)]  # fmt: skip
     fits = [identified(model, log) for log in logs]
     simulator = ReducedSimulator if small else MujocoSimulator
@@ -84,7 +84,7 @@ def run(small: bool, rng: np.random.Generator) -> Found:
 def drawn(model: MachineModel, name: str, rng: np.random.Generator) -> MachineModel:
     """The machine with its dry friction scaled by one random factor."""
     axis, factor = model.axes[name], rng.uniform(0.8, 1.25)
-    friction = study.friction_of(axis)
+    friction = shared.friction_of(axis)
     dry = {p.name for p in friction.effect.parameters if p.dry}
     values = {k: v * factor if k in dry else v for k, v in friction.values.items()}
     fitted = Fitted(friction.effect, values, friction.fixed)

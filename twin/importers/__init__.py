@@ -1,6 +1,6 @@
 """Logs of other programs -> Log: one module for each format, and a map that names the columns."""
 
-from twin.importers.importer import import_log, told_of
+from twin.importers.importer import import_log, import_notes
 from twin.importers.mapping import AxisMap, ColumnMap, ImportMap, load_mapping
 
-__all__ = ["AxisMap", "ColumnMap", "ImportMap", "import_log", "load_mapping", "told_of"]
+__all__ = ["AxisMap", "ColumnMap", "ImportMap", "import_log", "import_notes", "load_mapping"]

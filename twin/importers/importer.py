@@ -83,7 +83,7 @@ def _counted(mapping: ImportMap) -> Iterator[None]:
         yield
 
 
-def told_of(log: Log) -> list[str]:
+def import_notes(log: Log) -> list[str]:
     """What was done to a recording as it was imported, a sentence each."""
     return [v for k, v in log.metadata.items() if k.startswith((_NOTE, "resampled"))]
 

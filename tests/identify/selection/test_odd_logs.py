@@ -17,8 +17,13 @@ from identify.analysis.first_model import first_model
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement, Otherwise, Recorded
 from identify.estimation.disagreement import odd_in
+from identify.estimation.fit import Fit, fit_axis
 from identify.output.words.odd import odd_in_words, with_odd
+from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
+from identify.selection.doubts import Conclusion
+from identify.selection.odd_logs import without_odd_log
+from identify.selection.search import Found
 from twin.checks.report import CheckReport, Fault
 from twin.effects import Catalogue
 from twin.logs import Log
@@ -203,6 +208,26 @@ def test_a_diagnosis_is_made_without_it() -> None:
     assert told.dataset.odd.log == "run1"
     assert "run1 disagrees with the other logs" in str(found)
     assert [log.motion.name for log in told.dataset.training] == ["run0", "run2"]
+
+
+def test_of_each_set_of_logs_one_conclusion_is_made() -> None:
+    """Beside what all prove a log is odd, and beside what the others prove it is not."""
+    logs = runs()
+    spoiled = {**logs, "run2": with_force(logs["run2"], lambda force: force + 0.2)}
+    found = identify.fit(MODEL, spoiled)
+    good, dataset = found.fits["x"], found.datasets["x"]
+    poor = fit_axis(replace(SLIDE, effects=()), dataset.training)
+    asked = []
+
+    def concluded(base: Fit, logs: Dataset) -> Conclusion:
+        asked.append(tuple(log.motion.name for log in logs.training))
+        final = Judged(good if len(logs.training) == len(RIDES) else base, logs)
+        return Conclusion(Found(logs, Judged(base, logs), final, (), (), (), ()), ())
+
+    assert odd_in(poor.axis, dataset) is None
+    without_odd_log(poor, dataset, concluded)
+    assert asked[:2] == [("run0", "run1", "run2", "run3"), ("run0", "run1", "run3")]
+    assert len(asked) == len({*asked})
 
 
 def test_a_late_test_log_contradicts_nothing_and_is_told() -> None:

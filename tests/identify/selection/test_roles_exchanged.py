@@ -98,7 +98,8 @@ def test_other_logs_choose_in_turn_where_the_others_have_been() -> None:
     [
         (0.41, 0.7, 0.1, True),  # as large as it is elsewhere, in too short a log
         (0.41, -0.7, 0.1, False),
-        (0.05, 0.7, 0.0, False),
+        (0.12, 3.5, 0.0, True),  # half as much, as it may be of other logs
+        (0.09, 3.5, 0.0, False),
         (0.41, 0.7, 0.5, False),  # its force shifted in time takes as much
     ],
 )

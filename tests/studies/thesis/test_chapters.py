@@ -15,7 +15,7 @@ from studies.thesis import future, track
 from studies.thesis.__main__ import main
 from studies.thesis.mixed_friction import EQUAL, mixed, mixture
 from studies.thesis.reproduction import CHAPTERS, reproduce
-from studies.thesis.study import Found, four_logs, friction_of, machine
+from studies.thesis.shared import Found, four_logs, friction_of, machine
 from twin.errors import InputError
 from twin.model.machine import MachineModel
 
@@ -235,15 +235,15 @@ def test_a_mixture_is_found_where_there_is_one_and_elements_do_not_stand_in() ->
 
 def test_the_whole_study_is_that_of_the_thesis() -> None:
     """100 trials at 80 dB, 50 speeds, 20 reversals; 10 passes; nine places; 0.1 to 245 mm/s."""
-    from studies.thesis import cable, dynamic, simulation, study
+    from studies.thesis import cable, dynamic, shared, simulation
 
     speeds, span, repeats, trials, ratios = simulation.WHOLE
     assert (trials, ratios[0], len(set(speeds)), repeats, span) == (100, 80.0, 50, 20, 0.2)
     assert (min(speeds), max(speeds)) == (0.001, 0.41)
     assert (cable.REPEATS, cable.SPEED, cable.SPAN) == (10, 0.1, 0.3)
     assert (dynamic.AMPLITUDE, dynamic.PERIOD) == (0.21, 3.0)
-    np.testing.assert_allclose(study.places(9), -0.136 + 0.034 * np.arange(9))
-    np.testing.assert_allclose(study.places(2), [-0.136, 0.0])
+    np.testing.assert_allclose(shared.places(9), -0.136 + 0.034 * np.arange(9))
+    np.testing.assert_allclose(shared.places(2), [-0.136, 0.0])
     assert (track.SPAN, min(track.SPEEDS), max(track.SPEEDS)) == (0.01, 1e-4, 0.245)
     with pytest.raises(InputError, match="unknown chapter"):
         reproduce(["all"])

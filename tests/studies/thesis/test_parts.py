@@ -19,8 +19,8 @@ from studies.thesis import (
     future,
     models,
     residuals,
+    shared,
     simulation,
-    study,
     track,
 )
 from studies.thesis.mixed_friction import PARTS, mixed
@@ -28,8 +28,8 @@ from twin.effect import Kind
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, Fitted
 
-TRACK, _, STAGE = study.machine("track")
-OLD, _, AGING = study.machine("aging")
+TRACK, _, STAGE = shared.machine("track")
+OLD, _, AGING = shared.machine("aging")
 CURVE = StribeckCurve(0.285, 0.335, 0.01, 0.018)
 SPEEDS = np.array([0.001, 0.003, 0.006, 0.01, 0.015, 0.03, 0.06, 0.1, 0.2])
 
@@ -53,7 +53,7 @@ def test_what_was_planted_is_read_from_the_log_at_the_positions_of_what_was_foun
 
 
 def test_the_sine_carries_the_cable_at_its_place_without_feedback() -> None:
-    quiet = TRACK.with_axis("x", study.with_hardware(STAGE, current_noise=0.0))
+    quiet = TRACK.with_axis("x", shared.with_hardware(STAGE, current_noise=0.0))
     log = dynamic.sine(quiet, "x", 0.07, 6.0, np.random.default_rng(0))
     t = np.arange(len(log)) / 1e3
     assert len(log) == round((6.0 + 0.75) * 1e3)
@@ -74,10 +74,10 @@ def test_the_behaviours_are_what_they_say_and_lugre_has_its_traits() -> None:
     Under it LuGre creeps; it lags, and pushed fast it breaks away earlier (Al-Bender, Lampaert,
     Swevers 2005).
     """
-    model, name, axis = study.machine("simulation")
+    model, name, axis = shared.machine("simulation")
     stage, rng = models.noisy(model, name, axis), np.random.default_rng(0)
     logs = behaviours.behaviours(stage, rng)
-    static = study.friction_of(axis).values["Fs"]
+    static = shared.friction_of(axis).values["Fs"]
     assert np.abs(logs["drift"].axes["x"].force).max() < static
     assert np.abs(logs["break-away"].axes["x"].force).max() > static
     reached = logs["pre-sliding loops"].axes["x"].position
@@ -116,7 +116,7 @@ def test_a_mixture_is_the_weighted_sum_of_both(weight: float) -> None:
 
 def test_a_law_that_remembers_closes_its_inner_loop_and_dahls_does_not() -> None:
     """The gap is between two passes of one turn: of 0.4 in the loop, of 0.6 in the nested ones."""
-    known, leg = study.friction_of(AGING).values, round(behaviours.LEG * behaviours.RATE)
+    known, leg = shared.friction_of(AGING).values, round(behaviours.LEG * behaviours.RATE)
     gaps = {}
     for name in ("gms", "dahl"):
         axis = AxisModel(1.0, HARDWARE, (models.like(CATALOGUE[name], known),))

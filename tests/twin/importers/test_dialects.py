@@ -13,7 +13,7 @@ from import_cases import mapping
 
 from twin.errors import InputError
 from twin.importers.dialects import all_dialects, find_dialect
-from twin.importers.importer import import_log, table_of, told_of
+from twin.importers.importer import import_log, import_notes, table_of
 from twin.importers.mapping import EVERY_COLUMN
 from twin.importers.stated_time_base import find_time_base
 from twin.importers.table import numbers
@@ -75,7 +75,7 @@ def test_its_rate_is_read_or_asked_for_and_never_another(tmp_path, name):
     lines = "\n".join(line for line in clock.lines if not line.startswith("#"))
     log = import_log(path, mapping(tmp_path, map_of(name, f"{lines}\n")))
     assert log.sample_rate == pytest.approx(250.0, rel=1e-6)
-    assert not [text for text in told_of(log) if "states" in text]
+    assert not [text for text in import_notes(log) if "states" in text]
 
 
 @pytest.mark.parametrize("name", [n for n, sample in SAMPLES.items() if sample.is_text])
@@ -110,7 +110,7 @@ def test_a_torn_file_is_one_line_or_read_as_far_as_it_is_proved(tmp_path, name):
     if name in BAGS:
         log = import_log(path, known)
         assert 0 < len(log) < COUNT
-        assert "cut off" in told_of(log)[0]
+        assert "cut off" in import_notes(log)[0]
         return
     with pytest.raises(InputError, match=path.name) as refused:
         import_log(path, known)

@@ -13,7 +13,7 @@ from import_cases import map_of, mapping
 from mcap.writer import CompressionType, Writer
 
 from twin.errors import InputError
-from twin.importers import import_log, told_of
+from twin.importers import import_log, import_notes
 from twin.importers.guess import guess_map
 from twin.logs import Log, recover_file
 
@@ -65,7 +65,7 @@ def test_of_a_bag_that_was_cut_off_whole_chunks_are_read_and_recovered(
     log = imported(path)
     assert 0.7 * share * COUNT < len(log) <= COUNT
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q[: len(log)], atol=1e-12)
-    told = told_of(log)[0]
+    told = import_notes(log)[0]
     assert told.startswith("bytes ")
     assert f" to {int(share * len(data)) - 1}" in told
     assert "UTC" in told
@@ -74,7 +74,7 @@ def test_of_a_bag_that_was_cut_off_whole_chunks_are_read_and_recovered(
     assert recovery.lost == (told,)
     assert list(files) == [good]
     whole = imported(good)
-    assert not told_of(whole)
+    assert not import_notes(whole)
     np.testing.assert_array_equal(whole.axes["x"].position, log.axes["x"].position)
 
 
@@ -84,7 +84,7 @@ def test_a_bag_without_its_end_has_all_messages(tmp_path):
     path.write_bytes(path.read_bytes()[:-60])
     log = imported(path)
     assert len(log) == COUNT
-    assert "cut off" in told_of(log)[0]
+    assert "cut off" in import_notes(log)[0]
 
 
 def test_of_a_bag_with_a_hole_all_is_recovered_and_the_longest_part_imported(tmp_path):
@@ -95,7 +95,7 @@ def test_of_a_bag_with_a_hole_all_is_recovered_and_the_longest_part_imported(tmp
     data[place : place + 3] = b"\xff\x00\xff"
     path.write_bytes(data)
     log = imported(path)
-    told = " ".join(told_of(log))
+    told = " ".join(import_notes(log))
     assert "wrong checksum" in told or "cannot be decompressed" in told
     assert f"/drive: {len(log)} of " in told
     assert COUNT / 2 < len(log) < COUNT
@@ -115,7 +115,7 @@ def test_a_null_in_one_message_is_named_and_bridged_by_a_clock(tmp_path):
         imported(path)
     log = imported(path, "resample = 500.0\n" + MAP)
     assert len(log) == COUNT
-    assert "message 701 (1.4 s) has no f" in told_of(log)[0]
+    assert "message 701 (1.4 s) has no f" in import_notes(log)[0]
     assert abs(log.axes["x"].force[700] - F[700]) < 1e-5
 
 
@@ -124,7 +124,7 @@ def test_a_second_publisher_has_columns_of_its_own(tmp_path):
     write_bag(path, second=lambda k: {"t": T[k], "q": -7.0, "g": 2.0})
     log = imported(path)
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, atol=1e-12)
-    assert "/drive has 2 publishers, of 1500, 300 messages" in told_of(log)[0]
+    assert "/drive has 2 publishers, of 1500, 300 messages" in import_notes(log)[0]
     other = MAP.replace("/drive.", "/drive#2.").replace("#2.f", "#2.g")
     assert set(imported(path, other).axes["x"].position) == {-7e-3}
 

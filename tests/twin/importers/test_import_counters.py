@@ -11,7 +11,7 @@ from import_cases import mapping, write_csv
 
 from twin.checks import Fault, check_log
 from twin.errors import InputError
-from twin.importers import import_log, told_of
+from twin.importers import import_log, import_notes
 from twin.importers.counters import find_wraps
 from twin.logs import Log
 
@@ -109,7 +109,7 @@ def test_wraps_of_16_bits_are_told_and_taken_out_on_request(tmp_path, signed, st
     )
     expected = 2.0 * np.pi * np.rint(counts) / 4096.0
     np.testing.assert_allclose(whole.axes["q"].position, expected, atol=1e-9)
-    assert told_of(whole) == ["column 'enc': a counter that begins again after 65536 goes on"]
+    assert import_notes(whole) == ["column 'enc': a counter that begins again after 65536 goes on"]
     assert not [f for f in check_log(whole).findings if f.fault is Fault.WRAPPED]
 
 

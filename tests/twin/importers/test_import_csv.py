@@ -7,7 +7,7 @@ import pytest
 from import_cases import COUNT, MAP, mapping, table
 
 from twin.errors import InputError
-from twin.importers import import_log, told_of
+from twin.importers import import_log, import_notes
 from twin.importers.guess import guess_map
 from twin.logs import Log
 
@@ -103,7 +103,7 @@ def test_thousands_may_be_grouped(tmp_path: Path) -> None:
 def test_a_last_line_that_was_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
     log = imported(tmp_path, PLAIN[:-12])
     assert len(log) == COUNT - 1
-    assert f"line {COUNT + 1} is cut off and left out" in told_of(log)[0]
+    assert f"line {COUNT + 1} is cut off and left out" in import_notes(log)[0]
 
 
 def test_a_header_in_the_middle_is_another_recording(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_bad_cells_far_apart_are_told_at_once_by_line_and_blocks_between_are_rea
     rows[10], rows[2500], rows[4990] = rows[11], "# a pause", rows[4991]
     log = imported(tmp_path, "\n".join([HEADER, *rows]))
     assert len(log) == 4999
-    assert told_of(log) == ["line 2502 is a comment and left out: '# a pause'"]
+    assert import_notes(log) == ["line 2502 is a comment and left out: '# a pause'"]
 
 
 def test_counts_in_hexadecimals_are_read(tmp_path):

@@ -16,7 +16,7 @@ from mcap.opcode import Opcode
 from mcap_bytes import of
 
 from twin.errors import InputError
-from twin.importers import import_log, told_of
+from twin.importers import import_log, import_notes
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN
 from twin.logs import Log
@@ -199,7 +199,7 @@ def test_json_in_mcap_and_a_damaged_one(tmp_path):
         (tmp_path / "a.mcap").write_bytes(data)
         log = imported(tmp_path, "a.mcap", text)
         assert COUNT / 2 < len(log) < COUNT
-        lost, counted, kept = told_of(log)
+        lost, counted, kept = import_notes(log)
         assert f"bytes {chunk} to " in lost
         assert why in lost
         assert counted.startswith(f"of {COUNT} messages ")

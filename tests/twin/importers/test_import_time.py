@@ -11,7 +11,7 @@ import pytest
 from import_cases import map_of, mapping, write_csv
 
 from twin.errors import InputError
-from twin.importers import import_log, told_of
+from twin.importers import import_log, import_notes
 from twin.importers.guess import guess_map
 from twin.importers.stated_rate import stated_rate
 from twin.logs import Log
@@ -61,7 +61,7 @@ def test_stamps_of_any_locale_over_noon_and_over_the_end_of_a_month(tmp_path, wa
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, atol=1e-9)
     began = np.datetime64(start, "ns").astype(np.int64)
     assert int(log.metadata["start_time_unix_ns"]) == began
-    assert not told_of(log)
+    assert not import_notes(log)
     assert 'time = {column = "t", unit = "s"} # rises by 0.004 s' in proposed(tmp_path)
 
 
@@ -115,7 +115,7 @@ def test_a_clock_that_jumps_goes_on_and_that_is_told(tmp_path, stamp, start, sai
     unit = "us" if "32 bits" in said else "ms" if "16 bits" in said else "s"
     log = imported(tmp_path, text, f"t in {unit}")
     assert (log.sample_rate, len(log)) == (250.0, COUNT)
-    (told,) = told_of(log)
+    (told,) = import_notes(log)
     with pytest.raises(AssertionError, match=said):
         raise AssertionError(told)
     if "bits" not in said:
@@ -126,7 +126,7 @@ def test_one_row_twice_is_left_out_and_told(tmp_path):
     lines = rows(STAMPS["german"]).splitlines()
     log = imported(tmp_path, "\n".join([*lines[:300], lines[299], *lines[300:]]))
     assert (log.sample_rate, len(log)) == (250.0, COUNT)
-    assert told_of(log) == ["row 300: what the row before says, once more; left out"]
+    assert import_notes(log) == ["row 300: what the row before says, once more; left out"]
 
 
 def test_a_clock_coarser_than_the_samples_gives_the_rate_by_rows_a_stamp(tmp_path):
@@ -148,7 +148,7 @@ def test_a_rate_that_the_head_states_is_read(tmp_path, line):
     assert imported(tmp_path, text, "").sample_rate == pytest.approx(250.0)
     assert "sample_rate = 250 # Hz: the file states" in proposed(tmp_path)
     other = imported(tmp_path, text, "sample_rate = 500.0")
-    assert "the file states 250 Hz" in told_of(other)[0]
+    assert "the file states 250 Hz" in import_notes(other)[0]
 
 
 def test_words_that_state_no_rate():
@@ -252,7 +252,7 @@ def test_rows_out_of_order_are_put_in_order_and_said(tmp_path):
     text = clocked(T, order)
     log = imported(tmp_path, text)
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q, atol=1e-11)
-    assert told_of(log) == ["rows out of order in 2 places, the first row 102; put in order"]
+    assert import_notes(log) == ["rows out of order in 2 places, the first row 102; put in order"]
     assert "\nresample" not in guess_map(tmp_path / "a.csv").text
 
 

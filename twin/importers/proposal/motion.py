@@ -76,8 +76,8 @@ class Explained:
         """
         all_but = 0.9  # of what is left
         enough = 1e-3  # of the squared force
-        told_of = self.both_ways and self.explains
-        return told_of and self.helps > all_but and self.free - self.forward > enough
+        is_explained = self.both_ways and self.explains
+        return is_explained and self.helps > all_but and self.free - self.forward > enough
 
     @property
     def explains(self) -> bool:
