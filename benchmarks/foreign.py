@@ -160,7 +160,7 @@ def planted_row(name: str, wanted: float, seed: int, forms: Sequence[str] = ()) 
     found = diagnosed(own.model, own.machine, own.code)
     seconds = process_time() - begun
     shapes = tuple(FORMS[f] for f in forms)
-    expected = Expected(planted.right, planted.near, known_shapes=shapes)
+    expected = Expected(planted.right, planted.near, planted.shapes, known_shapes=shapes)
     return row_of(f"{name} @{wanted:g} {seed}", expected, found, seconds) | {
         "added": added_on_logs(own.base, found, own.code),
         "wanted": wanted if planted.right else 0.0,

@@ -36,13 +36,15 @@ class Planted:
     """An effect of the second simulator.
 
     make: (machine, size, generator) -> machine. right: catalogue names that say what it is. near:
-    names whose law is close enough to be of use. largest: size beyond which it is another machine.
-    drop: effects taken out of the model, to be found again. fixed: it has no size.
+    names whose law is close enough to be of use. shapes: laws of the model of which another shape
+    says it. largest: size beyond which it is another machine. drop: effects taken out of the model,
+    to be found again. fixed: it has no size.
     """
 
     make: Callable[[Machine, float, np.random.Generator], Machine]
     right: tuple[str, ...] = ()
     near: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
     largest: float = 1.0
     start: float = 0.01
     drop: tuple[str, ...] = ()
@@ -227,12 +229,16 @@ def single_bump(m, size, rng):
     return m.plus(FORCE, size * gaussian(PLACE - rng.uniform(-0.1, 0.1), 0.012))
 
 
+# A force of speed alone is that of a friction whose curve over speed has another shape.
 OUTSIDE = {
     "sawtooth force": Planted(sawtooth, near=("cogging",)),
     "cubic drag": Planted(
-        lambda m, s, r: replace(m, drag=s * 100.0 * SPEED**3), near=("quadratic_drag",)
+        lambda m, s, r: replace(m, drag=s * 100.0 * SPEED**3), near=("quadratic_drag",),
+        shapes=("lugre",),
     ),
-    "saturating drag": Planted(lambda m, s, r: replace(m, drag=s * np.tanh(SPEED / 0.06))),
+    "saturating drag": Planted(
+        lambda m, s, r: replace(m, drag=s * np.tanh(SPEED / 0.06)), shapes=("lugre",)
+    ),
     "random walk": Planted(random_walk),
     "force step in time": Planted(blow),
     "Stribeck speed by place": Planted(
@@ -240,7 +246,7 @@ OUTSIDE = {
         largest=0.8, start=0.2,
     ),
     "Stribeck exponent 1": Planted(
-        lambda m, s, r: m.having(n=2.0 - s), largest=1.0, start=0.3
+        lambda m, s, r: m.having(n=2.0 - s), shapes=("lugre",), largest=1.0, start=0.3
     ),
     "motor remanence": Planted(value("remanence")),
     "growing mass": Planted(value("mass_rate")),

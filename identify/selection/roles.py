@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from identify.selection.acceptance import Judged, Score, least_of, score
+from identify.selection.changes import control
 from identify.selection.findings import Finding
 from identify.selection.search import Found
 from identify.selection.trying import FEWEST_TURNS, refitted_on
@@ -26,8 +27,10 @@ class RoleDependent:
     named: bool
     """Whether it is proved as the roles are; else it is where other logs choose."""
     part: Number
-    """Of the score that refuses it, as t is."""
+    """Of the score that refuses it, as t and control are."""
     t: Number
+    control: Number = 0.0
+    """The part that it takes by chance, shifted in time."""
 
 
 def role_dependent(found: Found, findings: Sequence[Finding]) -> tuple[RoleDependent, ...]:
@@ -82,7 +85,7 @@ def _lost(
     for finding in findings:
         if refused := [s for s in _scores(found, finding, finals) if not _proved(s)]:
             worst = min(refused, key=lambda s: s.t)
-            yield RoleDependent(finding.effect, True, worst.part, worst.t)
+            yield RoleDependent(finding.effect, True, worst.part, worst.t, worst.control)
 
 
 def _scores(found: Found, finding: Finding, finals: Sequence[Judged]) -> list[Score]:
@@ -96,7 +99,10 @@ def _scores(found: Found, finding: Finding, finals: Sequence[Judged]) -> list[Sc
         axis = final.fit.axis
         for step in reversed(steps):
             axis = step.change.undone(axis, base) or axis
-        scores.append(score(refitted_on(axis, final), final))
+        without = refitted_on(axis, final)
+        there = score(without, final)
+        taken = control(steps[0].change, without, final) if there.accepted else 0.0
+        scores.append(replace(there, control=taken))
     return scores
 
 
@@ -114,7 +120,7 @@ def _gained(found: Found) -> Iterator[RoleDependent]:
     for tried in found.exchanged:
         own = tried.candidate.score
         if own is not None and not own.accepted:
-            yield RoleDependent(tried.change.name, False, own.part, own.t)
+            yield RoleDependent(tried.change.name, False, own.part, own.t, own.control)
 
 
 def _proved(there: Score) -> bool:
