@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from identify.selection.acceptance import Judged, Score, least_of, score
+from identify.rules import RULE
+from identify.selection.acceptance import Judged, Score, least_of, least_t, score
 from identify.selection.changes import control
 from identify.selection.findings import Finding
 from identify.selection.search import Found
@@ -27,7 +28,7 @@ class RoleDependent:
     named: bool
     """Whether it is proved as the roles are; else it is where other logs choose."""
     part: Number
-    """Of the score that refuses it, as t and control are."""
+    """Of the score that does not prove it, or hardly, as t and control are."""
     t: Number
     control: Number = 0.0
     """The part that it takes by chance, shifted in time."""
@@ -81,9 +82,9 @@ def with_exchanged(
 def _lost(
     found: Found, findings: Sequence[Finding], finals: Sequence[Judged]
 ) -> Iterator[RoleDependent]:
-    """Of the findings those that are not proved where other logs choose."""
+    """Of the findings those that are not surely proved where other logs choose."""
     for finding in findings:
-        if refused := [s for s in _scores(found, finding, finals) if not _proved(s)]:
+        if refused := [s for s in _scores(found, finding, finals) if not _surely(s)]:
             worst = min(refused, key=lambda s: s.t)
             yield RoleDependent(finding.effect, True, worst.part, worst.t, worst.control)
 
@@ -126,3 +127,10 @@ def _gained(found: Found) -> Iterator[RoleDependent]:
 def _proved(there: Score) -> bool:
     """Whether a law is proved beside all others, where it alone is asked."""
     return replace(there, among=1).accepted
+
+
+def _surely(there: Score) -> bool:
+    """Whether it still is where it is fitted a little otherwise, as another order would fit it."""
+    # a t has a spread of one; parts of like logs are often half as much again, and as often less
+    clear = there.t >= least_t(1) + 1.0 and there.part >= 1.5 * RULE.least_part
+    return clear and _proved(there)

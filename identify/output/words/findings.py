@@ -151,5 +151,9 @@ def role_in_words(law: RoleDependent) -> str:
     chance = f" ({percent(law.control)} by chance)" if law.control >= law.part > 0.0 else ""
     other = f"it takes {percent(max(law.part, 0.0))} of what is left{chance}, t = {law.t:.1f}"
     proved = "with other logs choosing it is"
-    says = f"{proved} not proved: {other}" if law.named else f"as they are not ({other}), {proved}"
+    says = (
+        f"{proved} not surely proved: {other}"
+        if law.named
+        else f"as they are not ({other}), {proved}"
+    )
     return f"whether {law.effect} is proved depends on which log chooses: {says}"

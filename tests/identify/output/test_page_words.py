@@ -200,7 +200,7 @@ def test_an_added_effect_is_noted_by_what_it_moved_removed_and_replaced() -> Non
 
 def test_by_which_log_a_law_is_proved_is_said_with_its_score() -> None:
     lost = role_in_words(RoleDependent("wear", named=True, part=-0.3, t=-1.27))
-    assert lost.endswith("choosing it is not proved: it takes 0 % of what is left, t = -1.3")
+    assert lost.endswith("choosing it is not surely proved: it takes 0 % of what is left, t = -1.3")
     by_chance = role_in_words(RoleDependent("wear", named=True, part=0.42, t=4.2, control=0.45))
     assert by_chance.endswith("it takes 42 % of what is left (45 % by chance), t = 4.2")
     gained = role_in_words(RoleDependent("wear", named=False, part=0.12, t=0.8))
