@@ -90,10 +90,14 @@ def _lost(
 
 
 def _scores(found: Found, finding: Finding, finals: Sequence[Judged]) -> list[Score]:
-    """Of a law beside all others where other logs choose; none of one that they tell nothing of."""
+    """Of a law beside all others where other logs choose; none of noise, which lowers no error.
+
+    One whose force a curve makes that was found later takes nothing: another order, which finds the
+    curve first, does not find it.
+    """
     base = found.base.fit.axis
     steps = [s for s in found.steps if s.change.name == finding.effect]
-    if any(s.held or s.tried.candidate.is_noise for s in steps):
+    if any(s.tried.candidate.is_noise for s in steps):
         return []
     scores = []
     for final in finals:
