@@ -260,7 +260,7 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
-    doubted = None if alone else _doubt(steps[0].change, less, final)
+    doubted = None if is_noise else _doubt(steps[0].change, less, final, held=alone)
     imitated = _imitated(steps[0], doubted, found)
     kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
@@ -297,9 +297,14 @@ def _imitated(step: Step, doubted: NotItself | None, found: Found) -> Imitated |
     return Imitated.OF_POSITION if beside and step.change.effect.is_of_place else None
 
 
-def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
-    """Why the values of a change cannot be its own; None where they can."""
+def _doubt(change: Change, less: Judged, final: Judged, held: bool) -> NotItself | None:
+    """Why the values of a change cannot be its own; None where they can.
+
+    held: whether a curve makes its force too, beside which its values may have become another's.
+    """
     own = doubt(less, final.fit, change.effect, parameters(change))
+    if held:
+        return own
     if own is None and is_of_bodies(less, final, change.effect):
         return NotItself(
             "another rotor, or bodies with values within a tenth of the file's, explain as much"

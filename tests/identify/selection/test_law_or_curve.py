@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ from planted_logs import SLIDE, Array, Ride, begun, few, having, logged
 
 from identify.selection.acceptance import Judged
 from identify.selection.changes import Reshaped
+from identify.selection.findings import findings_of
 from identify.selection.law_or_curve import follows, laws_for
-from identify.selection.search import search
-from identify.selection.trying import Beside, Tried, tried_beside
+from identify.selection.search import Found, Step, search
+from identify.selection.trying import Beside, Tried, effect_tried, tried_beside
 from twin.model.machine import AxisModel
 
 Force = Callable[[Array, Array], Array]
@@ -52,6 +54,28 @@ def test_a_law_that_takes_as_much_is_preferred_to_a_curve(true, beside, preferre
     first = search(judged.fit, judged.dataset, KNOWN).steps[0]
     assert isinstance(first.change, Reshaped) == (not preferred)
     assert first.tied == ()
+
+
+def test_a_law_that_a_later_curve_makes_is_doubted_where_its_values_became_anothers() -> None:
+    """Stops that let half of the travel free: a curve took over, and they are some of its force."""
+    law = few("end_stop")["end_stop"]
+    true = having(CABLED, "end_stop", low=-0.057, high=0.057, stiffness=1e3)
+    one, two = (logged(true, Ride(k)) for k in (3, 5))
+    base, dataset = begun(CABLED, {"one": one}, {"two": two})
+    stops = effect_tried(base, dataset, law)
+
+    def doubts(**values: float) -> list[str | None]:
+        fit = stops.judged.fit
+        there = {**fit.axis["end_stop"].values, **values}
+        axis = having(CABLED, "end_stop", **there)
+        ended = Judged(replace(fit, axis=axis), dataset)
+        first, steps = Judged(base, dataset), (Step(stops, held=True),)
+        return [f.doubt for f in findings_of(Found(dataset, first, ended, steps, steps, (), ()))]
+
+    assert doubts() == [None]
+    (why,) = doubts(low=-0.05, high=0.0)
+    assert why is not None
+    assert "free travel" in why
 
 
 @pytest.mark.slow  # 8 s

@@ -16,6 +16,7 @@ from benchmarks.second_simulator.recordings import recordings
 from benchmarks.silence import cases
 from identify import diagnose
 from identify.analysis.first_model import first_model
+from identify.selection.acceptance import least_t
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 
 KNOWN = few("cogging", "spring", "quadratic_drag")
@@ -39,6 +40,14 @@ def test_a_law_that_one_log_alone_proves_is_told_to_depend_on_which_log_chooses(
     (law,) = found.depends_on_roles
     assert (law.effect, law.named) == ("cogging", named)
     assert all(f.confidence is not None and f.confidence <= 0.75 for f in found.findings)
+
+
+def test_a_law_that_other_logs_prove_by_a_hair_is_told_to_depend_on_which_log_chooses() -> None:
+    (law,) = diagnosed(0.008, Ride(2, 2.0)).depends_on_roles
+    assert law.named
+    assert least_t(1) < law.t < least_t(1) + 1.0
+    assert law.part > 0.5 > law.control
+    assert not diagnosed(0.012, Ride(2, 2.0)).depends_on_roles
 
 
 def test_of_a_law_that_both_logs_prove_nothing_of_the_kind_is_told() -> None:
