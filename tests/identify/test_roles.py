@@ -72,6 +72,16 @@ def without(told: object, keys: set[str]) -> object:
     return [without(v, keys) for v in told] if isinstance(told, list) else told
 
 
+def test_the_errors_of_every_log_are_told_with_its_role(found):
+    told = {each.name: each for each in found.summaries["x"].by_log}
+    roles = {"a": Role.TRAINING, "b": Role.SELECTION, "c": Role.TEST}
+    assert {name: each.role for name, each in told.items()} == roles
+    assert all(each.seconds == pytest.approx(4.0, abs=0.1) for each in told.values())
+    before, after = found.summaries["x"].tested.before, found.summaries["x"].tested.after
+    assert (told["c"].before, told["c"].after) == pytest.approx((before, after))
+    assert all(each.after < 0.5 * each.before for each in told.values())
+
+
 def test_a_test_log_decides_nothing_and_gives_the_errors(found):
     other = diagnosed({"c": louder(TEST["c"])})
     told, changed = json_of(found), json_of(other)

@@ -136,7 +136,7 @@ def test_an_effect_is_taken_out_and_its_worth_told(drive: Path, answer: dict) ->
     assert text.startswith("took quadratic_drag off axis x\n")
     assert "The logs do not ask for it." in text
     said = refusal("remove", "wear", "better.toml", *ROLES, "-o", "x.toml", folder=drive)
-    assert "wear: cannot be taken out; axis x has" in said
+    assert "wear: cannot be taken out; axis x has coulomb_viscous" in said
 
 
 def test_what_is_no_answer_is_refused_in_one_line(drive: Path, answer: dict) -> None:
