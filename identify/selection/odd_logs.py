@@ -17,6 +17,8 @@ from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
 from identify.estimation.disagreement import odd_in, suspect
+from identify.estimation.errors import error_on
+from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
 from identify.selection.doubts import Conclusion, laws_of
 
@@ -51,12 +53,13 @@ def without_odd_log(
         if _may_be_all(odd):
             return ended, None
         return _without_suspect(base, dataset, without) or (ended, odd)
-    if ended.findings or (odd.is_sure and not unexplained):
+    clear = odd.is_sure or ended.found.final.at_floor
+    if clear and (ended.findings or not unexplained):
         return ended, odd
-    # Nothing was found without it: it may be the one that shows what the model lacks.
+    # Where the others are not explained without it, it may be the one that shows what is missing.
     whole = without(None)
     beside = _odd_beside(whole, dataset)
-    if whole.findings and _spoiling(beside, dataset) is None:
+    if whole.findings and _spoiling(beside, dataset) is None and _is_as_good(whole, ended):
         return whole, beside
     return (whole, None) if unexplained and _may_be_all(odd) else (ended, odd)
 
@@ -80,6 +83,14 @@ def _is_unexplained(ended: Conclusion) -> bool:
     """Whether something is left, and nothing was found that explains any of it."""
     final = ended.found.final
     return not ended.findings and not (final.fit.at_floor or final.other_at_floor)
+
+
+def _is_as_good(whole: Conclusion, ended: Conclusion) -> bool:
+    """Whether all logs come to what explains those without the odd one as well as they do."""
+    logs = (*ended.found.dataset.training, *ended.found.dataset.selection)
+    left = [rms(error_on(each.found.final.fit.axis, logs)) for each in (whole, ended)]
+    # a hundredth less or more is a fit of one log more
+    return not ended.findings or left[0] < 1.01 * left[1]
 
 
 def _without_suspect(
