@@ -73,6 +73,7 @@ def test_what_is_changed_must_move_and_nothing_else(changed, right):
         assert 0.2 / 250 < found.datasets["joint1"].channel_delay < 0.6 / 250
 
 
+@pytest.mark.slow  # 3 s
 def test_a_rotor_of_the_file_is_the_model_and_another_one_is_told_as_another_value():
     changed = Changed(rotor={1: 0.4 * OWN[1]})
     logs = [{f"{i}": log_of(ARM, changed, 30 + i, 8.0)} for i in range(2)]

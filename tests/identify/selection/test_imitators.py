@@ -157,6 +157,7 @@ def test_a_mass_that_no_motion_told_is_nobodys_place():
     assert found.refused is None
 
 
+@pytest.mark.slow  # 2 s
 def test_a_friction_out_of_step_is_no_late_motor():
     """A soft friction, as simulators make it, is ahead of its speed: a lag of 9 ms, with 98 %.
 

@@ -37,6 +37,7 @@ def test_what_the_beginnings_show_is_fitted_to_the_whole_of_long_logs() -> None:
     assert others == pytest.approx([row.gain.before] * len(others))
 
 
+@pytest.mark.slow  # 3 s
 def test_what_begins_behind_the_beginnings_is_told_of_the_whole_of_long_logs() -> None:
     def later(x: Array, v: Array) -> Array:
         return 5.0 * x * (np.arange(len(x)) > 0.6 * len(x))

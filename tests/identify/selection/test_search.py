@@ -140,7 +140,8 @@ def with_drag(power: float, size: float) -> AxisDiagnosis:
     return asked(SLIDE, SLIDE, few("quadratic_drag", "wear", "cogging"), drag, RIDE)
 
 
-@pytest.mark.parametrize("size", [0.02, pytest.param(0.2, marks=pytest.mark.slow)])
+@pytest.mark.slow  # 3 s
+@pytest.mark.parametrize("size", [0.02, 0.2])
 def test_a_drag_of_another_power_is_told_as_such_even_where_the_law_reaches_the_noise(size):
     (finding,) = with_drag(3.0, size).findings
     assert (finding.effect, finding.kind) == ("quadratic_drag", FindingKind.RESEMBLES)

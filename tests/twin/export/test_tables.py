@@ -183,10 +183,8 @@ def test_what_a_file_lacks_is_not_told_to_be_kept(left_out: str) -> None:
     assert {r.part for r in made.lost} == parts.get(left_out, {"constant_force", "cable_slab"})
 
 
-@pytest.mark.parametrize(
-    "to",
-    ["c", "csv", "twincat", "ros2_control"],
-)
+@pytest.mark.short(2)
+@pytest.mark.parametrize("to", ["twincat", "csv", "c", "ros2_control"])
 def test_an_export_is_told_to_be_that_of_the_model_or_of_one_before(tmp_path, to) -> None:
     model = MachineModel("drive", {"x": AxisModel(2.0, HARDWARE, PLAIN)}, 1000.0)
     save_model(model, tmp_path / "m.toml")
