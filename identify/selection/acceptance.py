@@ -45,7 +45,7 @@ from identify.rules import RULE
 Array = NDArray[np.float64]
 
 TINY = np.finfo(float).tiny  # N^2, of a residual that is nothing
-LIKE = 0.5  # of what a finding takes: fitted to other logs, it may make as much more or less
+IN_OTHERS = 0.5  # of what a finding takes: fitted to other logs, it may make as much more or less
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Score:
 
         These where those that choose hardly excite it; then the least of them has to be sure alone.
         """
-        if self.in_turn is None or self.other.apart >= LIKE * RULE.least_part:
+        if self.in_turn is None or self.other.apart >= IN_OTHERS * RULE.least_part:
             return self.other
         return self.in_turn if self.in_turn.t >= least_t(self.among) else self.other
 
@@ -112,7 +112,7 @@ class Score:
     @property
     def is_seen(self) -> bool:
         """Whether it takes half as much as a change is to take, sure or not, and not by chance."""
-        return self.part > max(LIKE * RULE.least_part, self.control) and self.t > 0.0
+        return self.part > max(IN_OTHERS * RULE.least_part, self.control) and self.t > 0.0
 
     @property
     def refused(self) -> str | None:

@@ -53,10 +53,10 @@ def without_odd_log(
         if _may_be_all(odd):
             return ended, None
         return _without_suspect(base, dataset, without) or (ended, odd)
-    clear = odd.is_sure or ended.found.final.at_floor
-    if clear and (ended.findings or not unexplained):
+    explained = bool(ended.findings) and ended.found.final.at_floor
+    if explained or (odd.is_sure and not unexplained):
         return ended, odd
-    # Where the others are not explained without it, it may be the one that shows what is missing.
+    # The others are as they were, or not explained: it may be the one that shows what is missing.
     whole = without(None)
     beside = _odd_beside(whole, dataset)
     if whole.findings and _spoiling(beside, dataset) is None and _is_as_good(whole, ended):
@@ -87,10 +87,16 @@ def _is_unexplained(ended: Conclusion) -> bool:
 
 def _is_as_good(whole: Conclusion, ended: Conclusion) -> bool:
     """Whether all logs come to what explains those without the odd one as well as they do."""
-    logs = (*ended.found.dataset.training, *ended.found.dataset.selection)
-    left = [rms(error_on(each.found.final.fit.axis, logs)) for each in (whole, ended)]
+    names = {log.motion.name for log in ended.found.dataset.logs}
+
+    def left(each: Conclusion) -> float:
+        dataset = each.found.dataset
+        deciding = (*dataset.training, *dataset.selection)
+        logs = [log for log in deciding if log.motion.name in names]
+        return rms(error_on(each.found.final.fit.axis, logs))
+
     # a hundredth less or more is a fit of one log more
-    return not ended.findings or left[0] < 1.01 * left[1]
+    return not ended.findings or left(whole) < 1.01 * left(ended)
 
 
 def _without_suspect(
