@@ -249,7 +249,8 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     own = steps[0].tried.candidate.score
     assert own is not None  # it was accepted
     is_noise = steps[0].tried.candidate.is_noise  # which lowers no error
-    alone = is_noise or any(step.held for step in steps)  # then the others tell nothing against it
+    held = any(step.held for step in steps)
+    alone = is_noise or held  # then the others tell nothing against it
     beside = own if alone else score(less, final, own.control, own.among)
     chosen, tested = _errors(less.fit, final.fit, dataset)
     whole = error_in(tested.on, found.base.fit, dataset)
@@ -260,7 +261,8 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     added = any(isinstance(s.change, Added) for s in steps)
     others = [s.change.name for s in found.steps if s.with_others and s not in steps]
     tied = (t.change.name for s in steps for t in s.tied)
-    doubted = None if is_noise else _doubt(steps[0].change, less, final, held=alone)
+    doubting = _of_values if held else _doubt
+    doubted = None if is_noise else doubting(steps[0].change, less, final)
     imitated = _imitated(steps[0], doubted, found)
     kind = FindingKind.MISSING if added else FindingKind.WRONG_SHAPE
     finding = Finding(
@@ -297,14 +299,14 @@ def _imitated(step: Step, doubted: NotItself | None, found: Found) -> Imitated |
     return Imitated.OF_POSITION if beside and step.change.effect.is_of_place else None
 
 
-def _doubt(change: Change, less: Judged, final: Judged, held: bool) -> NotItself | None:
-    """Why the values of a change cannot be its own; None where they can.
+def _of_values(change: Change, less: Judged, final: Judged) -> NotItself | None:
+    """Why the values of a change cannot be its own, as beside a curve that makes its force too."""
+    return doubt(less, final.fit, change.effect, parameters(change))
 
-    held: whether a curve makes its force too, beside which its values may have become another's.
-    """
-    own = doubt(less, final.fit, change.effect, parameters(change))
-    if held:
-        return own
+
+def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
+    """The same, and what else of the model explains as much; None where it can be itself."""
+    own = _of_values(change, less, final)
     if own is None and is_of_bodies(less, final, change.effect):
         return NotItself(
             "another rotor, or bodies with values within a tenth of the file's, explain as much"

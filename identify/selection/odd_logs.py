@@ -53,8 +53,7 @@ def without_odd_log(
         if _may_be_all(odd):
             return ended, None
         return _without_suspect(base, dataset, without) or (ended, odd)
-    explained = bool(ended.findings) and ended.found.final.at_floor
-    if explained or (odd.is_sure and not unexplained):
+    if (ended.findings and ended.found.final.at_floor) or (odd.is_sure and not unexplained):
         return ended, odd
     # The others are as they were, or not explained: it may be the one that shows what is missing.
     whole = without(None)
@@ -86,7 +85,12 @@ def _is_unexplained(ended: Conclusion) -> bool:
 
 
 def _is_as_good(whole: Conclusion, ended: Conclusion) -> bool:
-    """Whether all logs come to what explains those without the odd one as well as they do."""
+    """Whether all logs come to what explains those without the odd one as well as they do.
+
+    So it is where these came to nothing.
+    """
+    if not ended.findings:
+        return True
     names = {log.motion.name for log in ended.found.dataset.logs}
 
     def left(each: Conclusion) -> float:
@@ -96,7 +100,7 @@ def _is_as_good(whole: Conclusion, ended: Conclusion) -> bool:
         return rms(error_on(each.found.final.fit.axis, logs))
 
     # a hundredth less or more is a fit of one log more
-    return not ended.findings or left(whole) < 1.01 * left(ended)
+    return left(whole) < 1.01 * left(ended)
 
 
 def _without_suspect(
