@@ -252,13 +252,18 @@ def add(
     from identify.dataset.body import LINK_MASS
     from identify.output.as_json import found_in
 
+    ignored = [*(["--axis"] if axis else []), *(["--shape"] if shape else [])]
+    if ignored and (found or effect == LINK_MASS):
+        what = "--found adds all that an answer found" if found else f"{LINK_MASS} is of all axes"
+        raise InputError(f"{' and '.join(ignored)}: {what}; leave it out")
     machine, catalogue = loaded(model, effects)
     job: Callable[..., Any]  # an Addition, AllAdded or a CorrectedBody
     if found:
         with_all = found_in(Path(effect), machine, catalogue)
         job = partial(adding.add_found, with_all, test_function=test_function)
-    elif file := _copy_of(machine, out) if effect == LINK_MASS else None:
-        job = partial(adding.correct_body, file=file.name, test_function=test_function)
+    elif effect == LINK_MASS:
+        file = _copy_of(machine, out).name
+        job = partial(adding.correct_body, file=file, test_function=test_function)
     else:
         call = adding.add_shape if shape else adding.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
@@ -297,14 +302,9 @@ def _with_model(done: Done[Any], out: Path, given: MachineModel, fine: bool) -> 
 
 
 def _copy_of(machine: MachineModel, out: Path) -> Path:
-    """The MuJoCo file beside a model that is written; InputError where it is the user's own."""
+    """The MuJoCo file beside a model that is written, which is never the user's own."""
     file = out.with_suffix(".xml")
-    if file.name == machine.mjcf_name:
-        raise InputError(
-            f"--out {out}: its MuJoCo file would be {file.name}, which is the one that is to be "
-            "corrected; give another name"
-        )
-    return file
+    return file.with_stem(f"{file.stem}_corrected") if file.name == machine.mjcf_name else file
 
 
 @app.command()
@@ -331,6 +331,8 @@ def agree(
     first, catalogue = loaded(a, effects)
     if Path(b).suffix != ".toml" and Path(b).exists():
         return _export_agrees(a, first, Path(b), logs or [])
+    if logs:
+        raise InputError(f"{logs[0]}: two models are compared without logs; leave it out")
     second = load_model(b, catalogue)
     with progress_on_stderr() as progress:
         progress("comparing the fits", 0, 1)
@@ -398,11 +400,10 @@ def frf(
     with progress_on_stderr() as progress, heard() as silent:
         recorded = CheckedRecordings(paths)
         result = workflow.frequency_response(recorded, machine, progress=progress)
-    if out:
-        result.write(out)
-    if plot:
-        save_picture(result.plot(), plot)
-    return said_of(result, [*briefly(recorded.findings), *silent])
+    writes: list[Callable[[], object]] = [partial(result.write, out)] if out else []
+    writes += [lambda: save_picture(result.plot(), plot)] if plot else []
+    failed = tried(*writes)
+    return replace(said_of(result, [*briefly(recorded.findings), *silent]), unwritten=failed)
 
 
 @app.command()
@@ -445,8 +446,13 @@ def plan(
         return said_of(done.result, done.warnings, fine=False)
     chosen, table = done.result.chosen, out.with_suffix(ENDING)
     said = said_of(done.result, done.warnings, file=out, setpoints=table)
-    save_experiment(chosen.experiment, out, *said.text.splitlines()[:3], units=chosen.units)
-    write_setpoints(chosen.experiment, machine, 0, table)
+    head = said.text.splitlines()[:3]
+    failed = tried(
+        partial(save_experiment, chosen.experiment, out, *head, units=chosen.units),
+        partial(write_setpoints, chosen.experiment, machine, 0, table),
+    )
+    if failed:
+        return replace(said, unwritten=failed)
     own = (word for file in effects or () for word in ("--effects", file))
     run = in_shell("simulate", out, "--model", model, *own, "-o", out.with_suffix(".mcap"))
     text = (

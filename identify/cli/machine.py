@@ -68,7 +68,8 @@ def simulate(
     if setpoints is not None:
         run = chosen
         if isinstance(run, str):
-            run = find_experiment(run, stage, axis, duration or DURATION)
+            seconds = DURATION if duration is None else duration
+            run = find_experiment(run, stage, axis, seconds)
         write_setpoints(run, stage, seed, setpoints)
     reach = Reach(stage)
     with progress_on_stderr() as progress:

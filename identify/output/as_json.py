@@ -72,15 +72,18 @@ def found_in(path: Path, given: MachineModel, catalogue: Catalogue) -> MachineMo
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))
-        text = entries["model"] if entries["schema"] == _place(diagnoses.DiagnosisAnswer) else None
-    except (OSError, ValueError, TypeError, KeyError):
-        text = None
-    if not isinstance(text, str):
+        is_one = entries["schema"] == _place(diagnoses.DiagnosisAnswer)
+        document, mjcf = tomllib.loads(entries["model"] if is_one else ""), entries.get("mujoco")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, TypeError, KeyError):
+        document = {}
+    if not document:
         raise InputError(
             f"{path}: is no answer of a diagnosis; give what `twin diagnose ... --json` printed in "
             "the place of EFFECT"
         )
-    return parse_model(tomllib.loads(text), catalogue, entries["mujoco"] or given.mjcf, str(path))
+    return parse_model(document, catalogue, mjcf or given.mjcf, str(path))
 
 
 def _named(entries: dict[str, Any]) -> dict[str, Any]:

@@ -206,6 +206,12 @@ def test_a_truncated_log_is_recovered_diagnosed_and_no_effect_added(folder):
     assert json.loads(result.stdout)["kept"] is False
 
 
+def test_no_duration_is_refused_before_setpoints_are_written(tmp_path):
+    said = refusal("simulate", "tracking", "--duration", 0, "--setpoints", "s.csv", folder=tmp_path)
+    assert "duration" in said
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_drive_too_weak_for_its_motion_is_told_of(tmp_path):
     weak = STAGE.replace("force_limit = 200.0", "force_limit = 8.0", 1)
     (tmp_path / "weak.toml").write_text(weak)

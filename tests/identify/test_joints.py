@@ -405,7 +405,13 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     for name, log in zip("ab", logs, strict=True):
         write_log(log, tmp_path / f"{name}.mcap")
     add = ("add", "link_mass", "arm.toml", "a.mcap", "--holdout", "b.mcap", "-o")
-    assert "is the one that is to be corrected" in refusal(*add, "arm.toml", folder=tmp_path)
+    assert "--axis: link_mass is of all axes" in refusal(
+        *add, "corrected.toml", "--axis", "fore", folder=tmp_path
+    )
+    (tmp_path / "sub").mkdir()
+    done = twin(*add, "sub/arm.toml", "--json", folder=tmp_path)  # as the user's own is called
+    assert json.loads(done.stdout)["mujoco"] == "arm_corrected.xml"
+    assert load_model(tmp_path / "sub" / "arm.toml").mjcf_name == "arm_corrected.xml"
     done = twin(*add, "corrected.toml", "--json", folder=tmp_path)
     answer = valid(json.loads(done.stdout))
     assert (answer["body"], answer["mujoco"], answer["element"]) == (

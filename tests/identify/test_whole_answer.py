@@ -140,11 +140,20 @@ def test_an_effect_is_taken_out_and_its_worth_told(drive: Path, answer: dict) ->
 
 
 def test_what_is_no_answer_is_refused_in_one_line(drive: Path, answer: dict) -> None:
-    for name, text in (("no.json", "{}"), ("list.json", "[1]"), ("m.toml", None)):
+    agreed = {"schema": f"{answer['schema'].partition('#')[0]}#/$defs/ErrorAnswer", "error": "odd"}
+    damaged = {**answer, "model": "[axes"}
+    told = {"no.json": "{}", "list.json": "[1]", "error.json": json.dumps(agreed), "m.toml": None,
+            "damaged.json": json.dumps(damaged), "none.json": None}  # fmt: skip
+    for name, text in told.items():
         if text is not None:
             (drive / name).write_text(text, encoding="utf-8")
         said = refusal("add", "--found", name, "m.toml", *ROLES, "-o", "x.toml", folder=drive)
-        assert f"{name}: is no answer of a diagnosis" in said
+        why = "cannot be read: No such file" if name == "none.json" else "is no answer of a diag"
+        assert f"{name}: {why}" in said
+    assert "--axis and --shape: --found adds all" in refusal(
+        "add", "--found", "no.json", "m.toml", *ROLES, "-o", "x.toml", "--axis", "x", "--shape",
+        folder=drive,
+    )  # fmt: skip
     other = {**answer, "model": answer["model"].replace("axes.x", "axes.q").replace(".x]", ".q]")}
     (drive / "other.json").write_text(json.dumps(other), encoding="utf-8")
     assert "axes q" in refusal(

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.entries import read_entries, read_toml
-from twin.errors import InputError, at
+from twin.errors import InputError, Unwritten, at
 from twin.files import write_atomically
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import all_parameters, read
@@ -260,16 +260,21 @@ def save_model(model: MachineModel, path: str | Path) -> None:
     """Write the model as a TOML file, each value with its unit in a comment.
 
     Its MJCF text is written beside it where there is no such file yet. A file of that path is
-    replaced as a whole or not at all. Raises InputError where it cannot be written, and where it
-    could not be read again.
+    replaced as a whole or not at all. Raises InputError where it cannot be written, where it could
+    not be read again, and where the MJCF file beside it is another one.
     """
     path, text = Path(path), format_model(model)
     _checked(tomllib.loads(text), str(path))
-    write_atomically(path, text.encode())
     if model.mjcf and model.mjcf_name:
         beside = path.parent / model.mjcf_name
         if not beside.exists():
             write_atomically(beside, model.mjcf.encode())
+        elif read_mjcf(beside) != model.mjcf:
+            raise Unwritten(
+                f"{path}: beside it is another {beside.name}, which is kept; remove that, or give "
+                "another folder"
+            )
+    write_atomically(path, text.encode())
 
 
 def storable(hardware: Hardware) -> Hardware:

@@ -257,10 +257,16 @@ def test_every_value_stands_under_its_own_name_with_its_unit():
 
 
 def test_an_mjcf_that_is_there_already_is_left_as_it_is(tmp_path):
+    """A model beside another one's bodies would be read with these."""
     (tmp_path / "b.xml").write_text("<older/>")
-    save_model(stage(), tmp_path / "a.toml")
+    with pytest.raises(InputError, match=r"beside it is another b\.xml, which is kept"):
+        save_model(stage(), tmp_path / "a.toml")
     assert (tmp_path / "b.xml").read_text() == "<older/>"
-    assert load_model(tmp_path / "a.toml", CATALOGUE).mjcf == "<older/>"
+    assert not (tmp_path / "a.toml").exists()
+    (tmp_path / "b.xml").unlink()
+    for _ in range(2):  # its own is none in the way
+        save_model(stage(), tmp_path / "a.toml")
+        assert load_model(tmp_path / "a.toml", CATALOGUE).mjcf == stage().mjcf
     (tmp_path / "b.xml").unlink()
     with pytest.raises(InputError, match=r"mujoco = 'b\.xml' is not beside it"):
         load_model(tmp_path / "a.toml", CATALOGUE)
