@@ -139,7 +139,8 @@ class Follower:
         """Whether it is the file that was followed."""
         about = os.fstat(stream.fileno())
         file = (about.st_dev, about.st_ino)
-        if self._file is not None and (file != self._file or about.st_size < self._offset):
+        least = self._offset if self._offset > len(MAGIC) else 0  # which a new file does not have
+        if self._file is not None and (file != self._file or about.st_size < least):
             self.told.append(f"{self.path}: its writer begins anew")
             self._file = None
         if self._file is None:

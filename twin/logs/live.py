@@ -79,7 +79,6 @@ class LiveTopics:
     def _begin(self) -> None:
         self._incoming = Incoming(self.fields)
         self._arriving: dict[int, _Arriving] = {}
-        self._advertised: dict[int, Mapping[str, Any]] = {}
 
     def _connect(self) -> None:
         # Whoever serves does not wait, and what is not taken from it is lost: the queue has no end.
@@ -144,8 +143,18 @@ class LiveTopics:
             said = json.loads(text)
         except ValueError:
             return
-        if said.get("op") == "advertise":
-            self._subscribe([self._known(each) for each in said.get("channels", ())])
+        match said:
+            case {"op": "advertise", "channels": channels}:
+                self._subscribe([self._known(each) for each in channels])
+            case {"op": "unadvertise", "channelIds": numbers}:
+                self._forget(numbers)
+
+    def _forget(self, numbers: Sequence[int]) -> None:
+        """Wait for no more of topics that a server has taken back; it may serve them anew."""
+        for number in {*numbers} & {*self._arriving}:
+            self.told.append(f"{self.address}: {self._arriving.pop(number).topic.name}: taken back")
+            self._incoming.topics.forget(number)
+            self._incoming.drop()
 
     def _known(self, each: Mapping[str, Any]) -> int | None:
         """The number of a channel that holds samples of an axis."""
@@ -160,7 +169,7 @@ class LiveTopics:
         )  # fmt: skip
         topic = topics.topic(number)
         if topic is None or topic.is_truth:
-            del topics.channels[number], topics.schemas[number]
+            topics.forget(number)
             return None
         self._arriving[number] = _Arriving(topic)
         return number

@@ -287,6 +287,11 @@ class Topics:
             raise Damaged(f"{name} {record.id} is defined twice, differently")
         self._seen.add(content)
 
+    def forget(self, channel: int) -> None:
+        """Know a channel no more; its number may become that of another."""
+        del self.schemas[self.channels.pop(channel).schema_id]
+        self._topics.pop(channel, None)
+
     def names(self) -> list[str]:
         """All topics of the file, also those of no axis."""
         return sorted(channel.topic for channel in self.channels.values())

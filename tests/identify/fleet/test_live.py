@@ -48,20 +48,25 @@ def log() -> Log:
 class Machine:
     """Serves the samples of a log as a machine would."""
 
+    channel: Any
+
     def __init__(self, log: Log, port: int = 0, **metadata: str) -> None:
         self.columns = log.axes["x"].columns
         self.rate, self.context = log.sample_rate, foxglove.Context()
         context = self.context
         self.server = foxglove.start_server(port=port, context=context, message_backlog_size=9999)
+        self.advertise(**metadata)
+        foxglove.Channel("/camera", schema={"type": "object"}, context=context)
+
+    def advertise(self, **metadata: str) -> None:
         numbers = {name: FIELD_NUMBERS[name] for name in self.columns}
         schema = foxglove.Schema(
             name=AXIS_SAMPLE, encoding="protobuf", data=file_descriptor_set(AXIS_SAMPLE, numbers)
         )
         self.channel = foxglove.Channel(
-            "/axis/x", schema=schema, message_encoding="protobuf", context=context,
+            "/axis/x", schema=schema, message_encoding="protobuf", context=self.context,
             metadata=metadata,
         )  # fmt: skip
-        foxglove.Channel("/camera", schema={"type": "object"}, context=context)
 
     def send(self, first: int, last: int, late: float = 0.0) -> None:
         for i in range(first, last):
@@ -152,6 +157,20 @@ def test_a_server_that_dies_and_comes_back_is_followed_again(log) -> None:
             again.send(0, 1100)
             assert len(windows(live, 1)) == 1
         assert "serves again" in live.told[1]
+
+
+def test_a_topic_that_is_taken_back_and_served_anew_is_followed(log) -> None:
+    with machine(log) as made, followed(made) as live:
+        made.send(0, 1100)
+        assert len(windows(live, 1)) == 1
+        made.channel.close()
+        until(lambda: list(live.windows(1.0)) or live.told)
+        assert live.told == [f"{live.address}: /axis/x: taken back"]
+        made.advertise()
+        until(lambda: list(live.windows(1.0)) or made.channel.has_sinks())
+        made.send(2000, 3100)
+        assert [start for start, _ in windows(live, 1)] == [3.0]
+        assert len(live.told) == 1
 
 
 def test_where_nobody_serves_a_line_says_so(tmp_path) -> None:

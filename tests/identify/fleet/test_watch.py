@@ -45,6 +45,9 @@ def test_the_windows_of_a_growing_file_are_those_of_the_whole(log, tmp_path) -> 
     data, path, seen = written(log, tmp_path), tmp_path / "live.mcap", []
     follower = Follower(path)
     assert list(follower.windows(1.0)) == []  # its writer has not begun
+    path.touch()
+    for _ in range(2):
+        assert list(follower.windows(1.0)) == []  # or has not written anything
     for size in range(0, len(data) + 40_001, 40_001):
         path.write_bytes(data[:size])
         seen += follower.windows(1.0)
