@@ -99,20 +99,26 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
     assert rate is not None
     bases: list[tuple[ImportMap, Columns, TimeBase]] = []
     facts: dict[str, str] = {}
+    since: int | None = None  # ns: a clock's zero, from which a time in s keeps its digits
     for number, path in enumerate(paths, 1):
         own = mapping.of_file(number)
         with reading(path), _counted(own):
             recording = _read(path, own)
             own, mapping = (m.scaled_by(recording.scalars, number) for m in (own, mapping))
-            times = recording.absolute_times(own) + files[number - 1].offset
+            since = recording.start if since is None else since
+            times = recording.times_since(since, own) + files[number - 1].offset
             with recording.at_time(own):
                 bases.append((own, recording.columns, time_base_of(times, rate)))
         for key, fact in recording.facts.items():
-            facts[key] = ",".join(filter(None, (facts.get(key), fact)))
+            if key.startswith(_NOTE):
+                facts[f"{_NOTE}{number}_{key.removeprefix(_NOTE)}"] = f"{path.name}: {fact}"
+            else:
+                facts[key] = ",".join(filter(None, (facts.get(key), fact)))
+    zero = (since or 0) * 1e-9
     begin = max(base.times[0] for _, _, base in bases)
     end = min(base.times[-1] for _, _, base in bases)
     if not (end - begin) * rate >= 2.0:
-        ends = ((instant(base.times[0]), instant(base.times[-1])) for _, _, base in bases)
+        ends = ([instant(zero + base.times[i]) for i in (0, -1)] for _, _, base in bases)
         spans = "; ".join(f"{p} {a} to {b}" for p, (a, b) in zip(paths, ends, strict=True))
         raise InputError(f"the files have no time in common ({spans}); correct their offset (s)")
     grid = even_times(begin, end, rate)
@@ -122,8 +128,8 @@ def _of_several(paths: Sequence[Path], mapping: ImportMap) -> Log:
         if not shared.leaves_all:
             facts[f"resampled_{number}"] = shared.costs(own, columns)
         even |= {c.key: shared.resampled(columns[c.name]) for c in own.columns()}
-    if is_calendar(float(grid[0])):
-        facts["start_time_unix_ns"] = str(round(float(grid[0]) * 1e9))
+    if is_calendar(zero + float(grid[0])):
+        facts["start_time_unix_ns"] = str((since or 0) + round(float(grid[0]) * 1e9))
     return _log(mapping, even, rate, facts)
 
 
@@ -190,14 +196,19 @@ class _Recording:
                 f"the file states {stated.rate:.6g} Hz ({stated.text!r}), {what} {rate:.6g} Hz"
             )
 
-    def absolute_times(self, mapping: ImportMap) -> Array:
-        """The times (n,) of its rows in s, since 1970 where that is known."""
-        if self.times is None:
-            return np.arange(_common_length(self.columns)) / self.rate(mapping)
-        start = self.facts.get("start_time_unix_ns")
-        if start is not None and not is_calendar(self.times[0]):  # dates: seconds since the first
-            return self.times - self.times[0] + int(start) * 1e-9
-        return self.times
+    @property
+    def start(self) -> int:
+        """When it began, ns since 1970; 0 where that is not known."""
+        return int(self.facts.get("start_time_unix_ns", 0))
+
+    def times_since(self, zero: int, mapping: ImportMap) -> Array:
+        """The times (n,) of its rows in s since ``zero`` (ns), by the calendar if it is known."""
+        times = self.times
+        if times is None:
+            times = np.arange(_common_length(self.columns)) / self.rate(mapping)
+        if self.start and not is_calendar(times[0]):  # dates: seconds since the first
+            return times - times[0] + (self.start - zero) * 1e-9
+        return times - zero * 1e-9
 
 
 def _rises(column: NDArray) -> bool:

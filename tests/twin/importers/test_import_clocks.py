@@ -9,7 +9,7 @@ from import_cases import MAP as PLAIN
 from import_cases import map_of, mapping, write_csv
 
 from twin.errors import InputError
-from twin.importers import import_log
+from twin.importers import import_log, import_notes
 from twin.importers.guess import guess_map
 from twin.logs import Log
 
@@ -181,6 +181,20 @@ def test_two_files_on_one_clock(tmp_path):
     assert log.metadata["original_sha256"].count(",") == 1
     assert "x.position" in log.metadata["resampled_1"]
     assert "x.force" in log.metadata["resampled_2"]
+
+
+def test_what_was_done_to_each_of_two_files_is_said_of_it(tmp_path):
+    paths = write_two(tmp_path)
+    for path in paths:
+        head, first, second, *rows = path.read_text().splitlines()
+        path.write_text("\n".join([head, second, first, *rows]))
+    late = TWO.replace("sample_rate = 2000.0\noffset = 1.5", 'time = {column = "t", unit = "s"}')
+    notes = import_notes(import_log(paths, mapping(tmp_path, late)))
+    again = [note for note in notes if "put in order" in note]
+    assert [note.partition(":")[0] for note in again] == ["a.csv", "b.csv"]
+    assert {note.partition(": ")[2] for note in again} == {
+        "rows out of order in 1 places, the first row 2; put in order"
+    }
 
 
 def test_files_of_one_rate_need_no_clock(tmp_path):

@@ -75,6 +75,18 @@ def test_twincat_scope(tmp_path, shared, decimal, end):
     assert_signals(imported(tmp_path, "a.csv", timed))
 
 
+def test_two_scopes_begin_when_each_says_that_it_did(tmp_path):
+    for name, ticks in (("a", FILETIME), ("b", FILETIME + 5 * 10**4)):  # of 100 ns: 5 ms later
+        (tmp_path / f"{name}.csv").write_text(scope(shared=True).replace(str(FILETIME), str(ticks)))
+    text = SCOPE_MAP.replace('"MAIN.fForce", ', '"MAIN.fForce", file = 2, ')
+    both = mapping(tmp_path, 2 * "[[files]]\nsample_rate = 1000.0\n" + text)
+    log = import_log([tmp_path / "a.csv", tmp_path / "b.csv"], both)
+    axis = next(iter(log.axes.values()))
+    np.testing.assert_allclose(axis.position, 1e-3 * Q[5:], atol=1e-12)
+    np.testing.assert_allclose(axis.force, F[:-5], atol=1e-12)
+    assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9 + 5 * 10**6)
+
+
 def test_channels_of_two_sample_times_are_refused(tmp_path):
     (tmp_path / "a.csv").write_text(scope(shared=False, step="2"))
     with pytest.raises(InputError, match="sample times of 1, 2 ms"):
