@@ -2,7 +2,8 @@
 
 One function, used wherever something is decided: an effect more, an effect less, one effect against
 another, a free curve, an exponent, two effects together. Three numbers are compared with three
-thresholds (``RULE``):
+thresholds (``RULE``), less strictly where all other logs prove a change, choosing in turn
+(``Score.in_turn``):
 
 * part: of what the smaller model leaves of the squared force error above the noise floor, the part
   that the larger one takes. It is computed of the whole error and of a typical block (geometric

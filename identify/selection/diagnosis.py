@@ -68,17 +68,17 @@ class AxisDiagnosis:
 
     @property
     def missing(self) -> tuple[Finding, ...]:
-        """The findings that name an effect which the model lacks."""
+        """The findings that name an effect: which the model lacks, or has with another value."""
         return tuple(f for f in self.findings if f.kind is not FindingKind.WRONG_SHAPE)
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Names of the effects that are missing, in the order they were found."""
+        """Names of these effects, in the order they were found."""
         return tuple(f.effect for f in self.missing)
 
     @property
     def answers(self) -> tuple[tuple[str, ...], ...]:
-        """Each missing effect, followed by those that explain as much."""
+        """Each of these effects, followed by those that explain as much."""
         return tuple((f.effect, *f.tied) for f in self.missing)
 
     @property

@@ -117,7 +117,7 @@ def _unsure(findings: Sequence[Finding]) -> Iterator[RoleDependent]:
         if f.score.in_turn:
             groups = f.score.training, f.score.other
             part, t = (min(some) for some in zip(*((g.part, g.t) for g in groups), strict=True))
-            yield RoleDependent(f.effect, False, part, t)
+            yield RoleDependent(f.effect, False, part, t, f.score.control)
 
 
 def _gained(found: Found) -> Iterator[RoleDependent]:

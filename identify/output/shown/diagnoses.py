@@ -8,7 +8,7 @@ from identify.dataset.dataset import Role
 from identify.experiment_design.plan import Plan
 from identify.output.blocks import Block, Sentence, blocks_of, sentences
 from identify.output.candidates import line_of, row_of
-from identify.output.numbers import arrow, quantity
+from identify.output.numbers import arrow, listed, quantity
 from identify.output.words.diagnosis import said_of, tested_on
 from identify.output.words.fit import over_floor
 from identify.output.words.next_step import (
@@ -27,7 +27,7 @@ from identify.output.words.next_step import (
     supposed_in_words,
 )
 from identify.output.words.recording import read_otherwise_in_words
-from identify.output.words.verdict import all_found, named_in_words
+from identify.output.words.verdict import all_found, named_in_words, other_values
 from identify.results.results import Diagnosis
 from identify.selection.diagnosis import AxisDiagnosis
 from twin.experiments.file import in_short
@@ -56,7 +56,8 @@ def _of_axis(result: Diagnosis, axis: str, source: Source) -> Sentence:
     """The answer for an axis over all that is said of it."""
     d, said = result.axes[axis], said_of(result, axis)
     units, tested, plan = d.base.axis.units, d.tested, result.next_experiments.get(axis)
-    named = f" Missing: {named_in_words(d)}." if d.named else ""
+    named = f" Missing: {missing}." if (missing := named_in_words(d)) else ""
+    named += f" Of another value: {listed(others)}." if (others := other_values(d)) else ""
     fits = [d.base.error] if d.final is d.base else [d.base.error, d.final.error]
     floor = over_floor(units.force, result.summaries[axis].floor, *fits)
     errors = [f"{_errors(d, Role.TRAINING, fits[0], fits[-1])}, {floor}"]

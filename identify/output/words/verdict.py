@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from identify.output.numbers import listed, percent, spaced
+from identify.output.numbers import capitalised, listed, percent, spaced
 from identify.selection.diagnosis import AxisDiagnosis, Verdict
 from identify.selection.findings import Finding, FindingKind
 
@@ -52,18 +52,34 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
 
 
 def _proved(found: AxisDiagnosis) -> str:
-    several = len(found.named) > 1
-    lacks, them = ("several effects", "them") if several else ("an effect", "it")
-    proof = f"the training logs prove {them}, block by block; there is no selection log"
-    if found.dataset.selection:
-        proof = f"the training logs and the selection logs prove {them}"
-    if len(_other_values(found)) == len(found.named):
-        values = "Values of the machine's file are" if several else "A value of the file is"
-        return f"{values} not the machine's: {proof}."
-    return f"The model lacks {lacks}: {proof}."
+    lacking, others = _lacking(found), other_values(found)
+    said = []
+    if lacking:
+        said.append(f"the model lacks {'several effects' if lacking[1:] else 'an effect'}")
+    if others:
+        values = "values of the machine's file are" if others[1:] else "a value of the file is"
+        said.append(f"{values} not the machine's")
+    proof = _proof(found, "them" if len(found.missing) > 1 else "it")
+    return capitalised(f"{' and '.join(said)}: {proof}")
 
 
-def _other_values(found: AxisDiagnosis) -> list[str]:
+def _proof(found: AxisDiagnosis, them: str) -> str:
+    """What proves the findings; some stand by other logs, choosing in turn."""
+    if not found.dataset.selection:
+        return f"the training logs prove {them}, block by block; there is no selection log"
+    in_turn = [f.effect for f in found.missing if f.score.in_turn]
+    if len(in_turn) == len(found.missing):
+        return f"the training logs and all others, choosing in turn, prove {them}"
+    proof = f"the training logs and the selection logs prove {them}"
+    return f"{proof}, {listed(in_turn)} only with other logs choosing" if in_turn else proof
+
+
+def _lacking(found: AxisDiagnosis) -> list[Finding]:
+    """The findings of effects that the model does not have."""
+    return [f for f in found.missing if f.kind is not FindingKind.WRONG_VALUE]
+
+
+def other_values(found: AxisDiagnosis) -> list[str]:
     """The effects of which the file of the machine states another value than the logs show."""
     return [f.effect for f in found.findings if f.kind is FindingKind.WRONG_VALUE]
 
@@ -95,13 +111,12 @@ def headline_in_words(found: AxisDiagnosis) -> str:
     """E.g. "cogging or quadratic drag, and lugre are missing"."""
     match found.verdict:
         case Verdict.MISSING_EFFECTS:
-            are = "are" if len(found.named) > 1 else "is"
-            what = "missing"
-            if len(_other_values(found)) == len(found.named):
-                what = "not as the file says"
-            answer = f"{named_in_words(found)} {are} {what}"
+            lacking, others = _lacking(found), other_values(found)
+            said = [f"{named_in_words(found)} {_are(lacking)} missing"] if lacking else []
+            said += [f"{listed(others)} {_are(others)} not as the file says"] if others else []
             if reshaped := _reshaped(found):
-                answer += f", and {listed(reshaped)} has another shape"
+                said.append(f"{listed(reshaped)} has another shape")
+            answer = ", and ".join(said)
         case Verdict.WRONG_SHAPE:
             answer = f"{found.findings[0].effect} has another shape"
         case Verdict.UNEXPLAINED:
@@ -112,14 +127,19 @@ def headline_in_words(found: AxisDiagnosis) -> str:
     return spaced(f"{answer} (contradicted by the test logs: {against})" if against else answer)
 
 
+def _are(several: Sequence[object]) -> str:
+    return "are" if len(several) > 1 else "is"
+
+
 def named_in_words(found: AxisDiagnosis) -> str:
-    """Every effect that is named, e.g. "cogging or wear, and lugre"; empty where none is.
+    """Every effect that is missing, e.g. "cogging or wear, and lugre"; empty where none is.
 
     What explains next to nothing beside the others is told as such.
     """
-    large = [f for f in found.missing if f.explains >= WORTH] or found.missing
+    lacking = _lacking(found)
+    large = [f for f in lacking if f.explains >= WORTH] or lacking
     said = _each_in_words(found, large)
-    if small := [f for f in found.missing if f not in large]:
+    if small := [f for f in lacking if f not in large]:
         said += f", and for less than {percent(WORTH)} of the squared error "
         said += _each_in_words(found, small)
     return said

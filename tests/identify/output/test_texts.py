@@ -73,6 +73,10 @@ def curve_fit():
 
 COGGING, LUGRE = made.FOUND
 ALONE = replace(COGGING, tied=())
+OTHER_VALUE = replace(
+    LUGRE, kind=FindingKind.WRONG_VALUE, bend=FreeExponent("sigma2", 0.43, 0.71, "N s/m")
+)
+IN_TURN = replace(LUGRE.score, in_turn=LUGRE.score.training)
 TRAINED = replace(made.DATASET, channel_delay=0.0, selection=())
 SHAPE = FoundShape(
     Coordinate.SPEED, np.array([0.1, 0.2]), "m/s", None, True, "N",
@@ -228,6 +232,16 @@ TEXTS: dict[str, Callable[[], object]] = {
     "diagnosis: a law of another shape": lambda: shaped(FindingKind.WRONG_SHAPE),
     "diagnosis: a law with another exponent": lambda: shaped(
         FindingKind.WRONG_SHAPE, bend=FreeExponent("n", 2.0, 0.66, "1")
+    ),
+    "diagnosis: one missing, one of another value": lambda: of(
+        made.diagnosis_of(findings=(ALONE, OTHER_VALUE))
+    ),
+    "diagnosis: another value": lambda: of(made.diagnosis_of(findings=(OTHER_VALUE,))),
+    "diagnosis: one of two by other logs in turn": lambda: of(
+        made.diagnosis_of(findings=(ALONE, replace(LUGRE, score=IN_TURN)))
+    ),
+    "diagnosis: by other logs in turn": lambda: of(
+        made.diagnosis_of(findings=(replace(LUGRE, score=IN_TURN),))
     ),
     "diagnosis: unexplained": lambda: of(
         made.diagnosis_of(Verdict.UNEXPLAINED, unexplained=made.STRUCTURE)
