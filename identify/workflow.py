@@ -321,7 +321,7 @@ def diagnose(
 
 def _left_over(axes: Mapping[str, AxisDiagnosis]) -> dict[str, Region]:
     """Where what is unexplained is largest, by axis."""
-    regions = {a: worst_region(d.with_named, d.dataset) for a, d in axes.items() if d.unexplained}
+    regions = {a: worst_region(d.final, d.dataset) for a, d in axes.items() if d.unexplained}
     return {axis: region for axis, region in regions.items() if region}
 
 

@@ -92,7 +92,7 @@ def _with(
     return [*args[:place], *positional, *args[place:], *named]
 
 
-# Options with which a command opens a window, or asks, or only tells.
+# Options with which a command asks, or only tells.
 _ALONE = ("--guess", "--version")
 
 

@@ -1,6 +1,7 @@
 """The table of candidates: a row's values, as JSON has them, and its columns for page and terminal.
 
-A column more is a field of `CandidateRow`, its value in `row_of`, and a `Column` of `COLUMNS`.
+A column more is a field of `CandidateRow`, its value in `row_of`, and a `Column` of `COLUMNS`; then
+`python -m identify.output.as_json`, and the stored texts of `tests/identify/output`.
 """
 
 from __future__ import annotations

@@ -163,7 +163,6 @@ class Folder:
         return sorted((self.root / OWN / "states").glob("*.toml"), key=lambda p: int(p.stem))
 
 
-def project_here(folder: Path | None = None) -> Folder | None:
+def project_here() -> Folder | None:
     """The project of the folder where a command runs; None where there is none."""
-    root = Path() if folder is None else folder
-    return Folder(root) if (root / FILE).is_file() else None
+    return Folder(Path()) if Path(FILE).is_file() else None

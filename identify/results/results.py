@@ -298,7 +298,8 @@ def with_all_found(
 
 def _steps_of(found: AxisDiagnosis) -> Iterator[HistoryStep]:
     """What a diagnosis did to the errors, for each law that it added or changed."""
-    changed = {f.effect: f.kind is FindingKind.WRONG_SHAPE for f in found.findings}
+    bent = (FindingKind.WRONG_SHAPE, FindingKind.WRONG_VALUE)
+    changed = {f.effect: f.kind in bent for f in found.findings}
     return steps_together(changed, found.base, found.final, found.dataset)
 
 
@@ -307,7 +308,7 @@ def steps_together(
 ) -> Iterator[HistoryStep]:
     """A step for each law of an axis that was changed, with the errors without and with all.
 
-    changed: by name of the law, whether it got another shape.
+    changed: by name of the law, whether it was there and got another shape or value.
     """
     errors = step_errors(before, after, dataset)
     for name, is_shape in changed.items():

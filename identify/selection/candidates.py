@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
 NO_SCORE = "by one linear step it gains too little"
+SMALL_NOISE = "its noise is no good part of the error, or more than it"
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,8 @@ class Candidate:
 
     evidence, gain: Schwarz's criterion on the training logs, and the errors on the logs that were
     not fitted, for the report; neither decides. score: the acceptance test; None where one linear
-    step takes so little that no refit was made. doubt: why its values cannot be its own; None where
-    they can.
+    step takes so little that no refit was made, or where noise makes too little of the error.
+    doubt: why its values cannot be its own; None where they can.
     """
 
     effect: Effect
@@ -107,7 +108,7 @@ class Candidate:
     def refused(self) -> str | None:
         """Why the data do not prove it, in words; None where they do."""
         if self.score is None:
-            return NO_SCORE
+            return SMALL_NOISE if self.effect.is_noise else NO_SCORE
         return self.doubt.why if self.doubt else self.score.refused
 
     @property

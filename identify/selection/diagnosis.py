@@ -81,11 +81,6 @@ class AxisDiagnosis:
         """Each of these effects, followed by those that explain as much."""
         return tuple((f.effect, *f.tied) for f in self.missing)
 
-    @property
-    def with_named(self) -> Fit:
-        """The fit with what was found, beside which a remainder is left."""
-        return self.final
-
     @cached_property
     def tested(self) -> Errors:
         """Test errors without and with what was found; without test logs, of those that chose."""

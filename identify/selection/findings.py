@@ -208,7 +208,7 @@ def without_law(name: str, found: Found) -> Found:
     """What was found without all changes of one law, the rest fitted again from the base."""
     own = [s for s in found.steps if s.change.name == name]
     rest = tuple(s for s in found.steps if s not in own)
-    return replace(found, final=_without(own, found), steps=rest)
+    return replace(found, final=_without(own, found), steps=rest, last=())
 
 
 def _without(steps: Sequence[Step], found: Found) -> Judged:

@@ -18,7 +18,7 @@ from identify.estimation.evidence import rms
 from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import RIDGE, orthonormal, unabsorbed
 from identify.selection.acceptance import Judged
-from identify.selection.search import NEARLY
+from identify.selection.law_or_curve import NEARLY
 from identify.selection.what import What
 from twin.effect import Effect, Kind
 from twin.signals import Array

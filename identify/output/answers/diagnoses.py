@@ -207,9 +207,9 @@ class RemainderEntry(Entry):
 def _remainder(d: AxisDiagnosis, region: Region | None) -> RemainderEntry | None:
     if d.unexplained is None:
         return None
-    units = {"period_unit": d.unexplained.unit, "unit": d.with_named.axis.units.force}
+    units = {"period_unit": d.unexplained.unit, "unit": d.final.axis.units.force}
     said = advice(d.findings)
-    return RemainderEntry.of(d.unexplained, d.with_named, **units, where=region, advice=said)
+    return RemainderEntry.of(d.unexplained, d.final, **units, where=region, advice=said)
 
 
 # --- diagnoses -------------------------------------------------------------------------------

@@ -161,14 +161,13 @@ def no_interval_in_words(reason: NoInterval) -> str:
     return f"no interval: {why}"
 
 
-def estimate_in_words(e: Estimate, common: NoInterval | None = None) -> tuple[str, str]:
-    """A value with its unit; its 90 % interval, or why it has none. common: said of all already."""
+def estimate_in_words(e: Estimate) -> tuple[str, str]:
+    """A value with its unit; its 90 % interval, or why it has none."""
     scale = DisplayUnit.of(e.unit, [e.value])
     if not e.free:
         return scale.text(e.value), "fixed"
     if e.low is None or e.high is None:
-        why = no_interval_in_words(e.reason) if e.reason and e.reason != common else ""
-        return scale.text(e.value), why
+        return scale.text(e.value), no_interval_in_words(e.reason) if e.reason else ""
     low, value, high = scale.within(e.low, e.high, e.low, e.value, e.high)
     return f"{value} {scale.unit}".rstrip(), f"{low} to {high}"
 

@@ -9,7 +9,7 @@ from servo_loop import RATE, loop
 
 from twin.importers.guess import guess_map
 from twin.importers.proposal.courses import columns_of, course, follows
-from twin.importers.proposal.doubts import doubts_of_log
+from twin.importers.proposal.doubts import doubts_as_metadata
 from twin.importers.proposal.motion import explained
 from twin.logs import AxisLog, Log
 
@@ -195,6 +195,6 @@ SIGNALS = {"position": SERVO.position, "setpoint_position": SERVO.setpoint, "for
 )  # fmt: skip
 def test_an_imported_log_says_what_its_signals_contradict(changed, said):
     log = Log(RATE, {"x": AxisLog({**SIGNALS, **changed})})
-    found = "; ".join(doubts_of_log(log))
+    found = "; ".join(doubts_as_metadata(log).values())
     assert said in found
     assert bool(found) is bool(said)

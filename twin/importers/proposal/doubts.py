@@ -22,14 +22,10 @@ def motion_of_force(axis: AxisLog) -> Explained | None:
     return None if found is None else explained(found[0].short, [found[1].short])[0]
 
 
-def doubts_of_log(log: Log) -> Iterator[str]:
-    """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each."""
-    return iter(doubts_as_metadata(log).values())
-
-
 def doubts_as_metadata(log: Log) -> dict[str, str]:
-    """The same as entries of the log's metadata, "doubt.x.0", which a check reads.
+    """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each.
 
+    As entries of the log's metadata, "doubt.x.0", which a check reads;
     "partial.x" where a part of the force of an axis is missing for sure: it does work on friction,
     which the others of a machine with several may do. Of an axis whose counter begins again that is
     told, and nothing else is.
