@@ -115,7 +115,7 @@ def _driven(
 
 
 def _load(axis: AxisModel, log: PreparedLog) -> Array:
-    """Force (n,) N that the motion asks of the motor by the model, less what depends on it.
+    """Force (n,) N that the motion asks of the motor by the model.
 
     In each block, from the means by test functions. Not the measured command: of that friction in
     its proportion takes noise as well, and "explains" it.
@@ -125,16 +125,30 @@ def _load(axis: AxisModel, log: PreparedLog) -> Array:
 
 @lru_cache(maxsize=16)  # whatever is walked at the same values of an axis bears the same load
 def _load_of(loading: Valued, mass: float, log: PreparedLog) -> Array:
+    """The load: what all else asks, less the friction under it, by a step of Newton."""
+    axis, motion = loading.axis, true_motion(loading.axis, log.motion)[0]
+    others = parts_of(axis, *(set(Kind) - {*RUBBING}))
     bodies = log.fine.mean(log.motion.raw[1]) - log.command
-    asked = mass * log.acceleration - averaged_force(loading.axis, [log]) + bodies
-    return _sharpened(asked[None], log)[0]
+    asked = mass * log.acceleration - averaged_force(others, [log]) + bodies
+    asked = _sharpened(asked[None], log)[0]
+    rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
+    bare = replace(rubbing, effects=tuple(f for f in rubbing.effects if not f.effect.reads("U")))
+    load = asked - total_force(_table_between(bare), motion)
+    friction, slope = _under_load(_table_between(rubbing), motion, load)
+    return load - (load - asked + friction) / (1.0 + slope)
 
 
 def _loading(axis: AxisModel) -> AxisModel:
-    """The axis with what makes the load of its friction alone."""
-    loaded = _borne(axis)
-    acting = (f for f in axis.effects if f.effect.kind is not Kind.ACTUATION)
-    return replace(axis, effects=tuple(f for f in acting if f.effect.name not in loaded))
+    """The axis with what makes the load of its friction."""
+    return parts_of(axis, *(set(Kind) - {Kind.ACTUATION}))
+
+
+def _under_load(table: Table, motion: Motion, load: Array) -> tuple[Array, Array]:
+    """The force (n,) N of a friction under a load (n,) N, and how it changes with that."""
+    locks = 0.8  # of a load: a friction that grows by more of it lets the axis hardly move
+    step = STEP * (float(np.std(load)) or 1.0)
+    now, then = (total_force(table, _under(motion, force)) for force in (load, load + step))
+    return now, np.maximum((then - now) / step, -locks)
 
 
 def _sharpened(means: Array, log: PreparedLog) -> Array:
@@ -343,24 +357,17 @@ def _by_load(
     own = [j for j, c in enumerate(where) if _loads(loading, c.effect)]
     if not own:
         return out
-    moved = -walked
-    # of a friction that it bears, the part that makes the load is without what the load makes
-    rubs = [j for j in own if where[j].effect and loading[where[j].effect].effect.kind in RUBBING]
-    if rubs:
-        every = np.ones(walked.shape[1], dtype=bool)
-        moved[rubs] = -_walked(loading, logs, [where[j] for j in rubs], steps[rubs], every)
     rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
     table = _table_between(rubbing)
 
     def followed(job: tuple[PreparedLog, Array]) -> Array:
         log, means = job
-        motion, by = _driven(rubbing, log, axis)[0], _sharpened(means.T, log)
-        load, now = motion.signals[2], total_force(table, motion)
-        step = STEP * (float(np.std(load)) or 1.0)
-        by *= (total_force(table, _under(motion, load + step)) - now) / step
+        motion = _driven(rubbing, log, axis)[0]
+        slope = _under_load(table, motion, motion.signals[2])[1]
+        by = _sharpened(-means.T, log) * (slope / (1.0 + slope))  # more load, more friction
         return log.test_function.mean(by)
 
-    each = zip(logs, split_by_log(moved[own].T, logs), strict=True)
+    each = zip(logs, split_by_log(walked[own].T, logs), strict=True)
     out[own] = np.concatenate(spread(followed, each), axis=1)
     return out
 

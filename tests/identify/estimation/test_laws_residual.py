@@ -20,7 +20,7 @@ from constructed import (
     waves,
     windowed,
 )
-from machines import CATALOGUE
+from machines import CATALOGUE, tracked
 
 from identify.dataset.blocks import Blocks
 from identify.dataset.motion import motion_of
@@ -33,9 +33,10 @@ from identify.estimation.force_balance import (
     jacobian,
     residual,
 )
+from identify.workflow import fit
 from twin.effect import Kind
 from twin.laws.trials import legal
-from twin.model.machine import AxisModel, Fitted
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.parameters import free_parameters, read, write
 
 LOGS = [windowed(SHORT)]
@@ -111,6 +112,24 @@ def test_derivatives_of_some_test_functions_are_those_of_all_there(one):
     kept = np.random.default_rng(1).random(sum(map(len, logs))) < 0.6
     whole = jacobian(axis, logs, where)
     np.testing.assert_array_equal(jacobian(axis, logs, where, kept), whole[kept])
+
+
+def test_a_friction_that_grows_with_its_load_bears_what_it_makes_itself():
+    """A quarter of the load, the weight of a vertical axis above all."""
+    friction = {"Fc": 10.0, "Fs": 10.0, "sigma2": 40.0}
+    laws = [
+        effect("constant_force", {"F0": -150.0}), effect("coulomb_viscous", friction),
+        effect("load_dependent_friction", {"motor": 0.025}),
+    ]  # fmt: skip
+    true = AxisModel(20.0, Hardware(force_limit=1e3, travel=(-0.1, 0.1)), effects=tuple(laws))
+    machine = MachineModel("worm", {"x": true}, 1000.0)
+    log = tracked(machine, 1, 8.0, "moves")
+    begun = true.with_effect(effect("load_dependent_friction", {"motor": 0.01}))
+    given = machine.with_axis("x", replace(begun, mass=24.0))
+    found = fit(given, {"a": log}, test_function=0.02).fits["x"]
+    assert found.axis.mass == pytest.approx(20.0, rel=2e-3)
+    assert found.axis["constant_force"].values["F0"] == pytest.approx(-150.0, rel=2e-3)
+    assert found.axis["load_dependent_friction"].values["motor"] == pytest.approx(0.025, rel=2e-2)
 
 
 def test_the_residual_of_an_exactly_integrated_motion_is_zero():
