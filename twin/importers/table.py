@@ -125,6 +125,15 @@ def chosen(wanted: Iterable[str], there: Collection[str]) -> tuple[str, ...]:
     return names or tuple(there)
 
 
+def with_unit(name: str, unit: str, asked: Collection[str]) -> str:
+    """A column's name with the unit that its file states beside it, unless it is asked for without.
+
+    unit: "" where none is stated.
+    """
+    plain = not unit or name in asked or name.endswith(("]", ")"))
+    return name if plain else f"{name} [{unit}]"
+
+
 def split_columns(name: str, values: NDArray) -> dict[str, NDArray]:
     """A vector as it is; a matrix as ``name[1]``, ``name[2]``, ... along its shorter side.
 

@@ -26,7 +26,7 @@ from twin.importers.bad_cells import BadCells, BadRow
 from twin.importers.mapping import ImportMap
 from twin.importers.proposal.lexicon import words_of_the_far_east
 from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
-from twin.importers.table import SignalTable, chosen
+from twin.importers.table import SignalTable, chosen, with_unit
 
 ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".prn")
 HEAD = 1 << 16  # bytes in which a dialect is known and its first row is found
@@ -184,9 +184,7 @@ class Layout:
     def called(self, asked: Collection[str]) -> list[str]:
         """The names of the columns, with their units unless they are asked for without."""
         units = self.units or ("",) * len(self.names)
-        both = zip(self.names, units, strict=True)
-        return [n if not unit or n in asked or n.endswith(("]", ")")) else f"{n} [{unit}]"
-                for n, unit in both]  # fmt: skip
+        return [with_unit(n, u, asked) for n, u in zip(self.names, units, strict=True)]
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:

@@ -37,6 +37,8 @@ from scipy.io import loadmat, savemat
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
 from twin.importers.dialects.mat import content_bytes
+from twin.importers.importer import table_of
+from twin.importers.mapping import EVERY_COLUMN
 from twin.importers.table import numbers, require_columns, split_columns
 from twin.logs.log import FIELDS
 
@@ -328,6 +330,37 @@ def test_a_scale_may_be_a_scalar_of_the_file(tmp_path: Path) -> None:
     for name, said in (("q", "name a scalar"), ("gian", "no column 'gian'; did you mean 'gain'")):
         with pytest.raises(InputError, match=said):
             import_log(file, mapping(tmp_path, text.replace("gain", name)))
+
+
+def stated_hdf5(path: Path, values: np.ndarray) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        for name, unit in (("q", "mm"), ("f", np.bytes_("kN"))):
+            file[f"run/{name}"] = values
+            file[f"run/{name}"].attrs["units" if name == "q" else "unit"] = unit
+
+
+def stated_tdms(path: Path, values: np.ndarray) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(str(path)) as writer:
+        given = (("q", "mm"), ("f", "kN"))
+        writer.write_segment([
+            nptdms.ChannelObject("run", name, values, {"unit_string": unit}) for name, unit in given
+        ])  # fmt: skip
+
+
+@pytest.mark.parametrize(("ending", "write"), [("h5", stated_hdf5), ("tdms", stated_tdms)])
+def test_units_that_a_file_states_beside_its_columns_are_part_of_their_names(
+    tmp_path, ending, write
+):
+    """A map may name a column without."""
+    path, values = tmp_path / f"run.{ending}", np.sin(np.arange(50.0))
+    write(path, values)
+    columns = table_of(path, EVERY_COLUMN).columns
+    assert {*columns} == {"run/q [mm]", "run/f [kN]"}
+    for names in (("run/q", "run/f"), ("run/q [mm]", "run/f [kN]")):
+        log = import_log(path, mapping(tmp_path, map_of(*names, units=("mm", "kN"))))
+        assert log.axes["x"].force == pytest.approx(1e3 * values)
 
 
 def hdf5_bomb(path: Path) -> None:

@@ -359,6 +359,27 @@ def test_units_below_the_names_are_read(tmp_path):
     np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("position", "rate", "force", "said"),
+    [
+        ("deg", "U/min", "Nm", 'velocity = {column = "v [U/min]", unit = "rpm"}'),
+        ("deg", "min-1", "% Mn", 'force = {column = "torque [% Mn]", unit = "%"}'),
+        ("Inkr", "1/min", "‰", 'velocity = {column = "v [1/min]", unit = "rpm"}'),
+    ],
+)
+def test_units_below_the_names_may_be_those_of_a_drive(tmp_path, position, rate, force, said):
+    turn = {"deg": 360.0, "Inkr": 65536.0}[position]
+    angle = np.rint(turn * Q / np.ptp(Q)) if position == "Inkr" else turn * Q / np.ptp(Q)
+    speed = np.gradient(angle, T) / turn * 60.0
+    write_csv(tmp_path / "a.csv", {"t": T, "position": angle, "v": speed, "torque": F})
+    names, _, rows = (tmp_path / "a.csv").read_text().partition("\n")
+    text = f"{names}\ns,{position},{rate},{force}\n{rows}"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    found = guess_map(tmp_path / "a.csv").text
+    assert said in found
+    assert ("N m for one" in found) is (force != "Nm")
+
+
 def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tmp_path):
     """A setpoint that comes later than its position is none by the numbers."""
     later = np.concatenate([np.zeros(2), REACHED[:-2]])

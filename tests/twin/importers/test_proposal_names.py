@@ -52,6 +52,10 @@ v  mm/s .      vel_mm_s
 v  deg/s .     speed_dps
 f  Nm  .       torque_nm
 f  %   .       torque_pct
+f  %   .       torque [% Mn]
+f  1   .       Drehmoment [0/00 Mn]
+f  1   .       torque [per mille]
+f  1   .       torque (0.1 % rated)
 p  nm  .       position_nm
 i  A   .       torque [A]
 p  rad .       velocity [rad]

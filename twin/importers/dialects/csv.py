@@ -17,6 +17,7 @@ from pathlib import Path
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
+from twin.importers.proposal.names import units_of
 from twin.importers.stamps import is_date, is_stamp
 from twin.importers.table import SignalTable, parsing
 from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
@@ -161,14 +162,20 @@ def _widths(row: Sequence[str]) -> tuple[int, ...]:
 def _count_of_names(cells: Sequence[str]) -> int:
     """How many of some cells are words, and no units."""
     words = (cell for cell in cells if re.search(r"[^\W\d_]", cell))
-    return sum(not is_usual_unit(cell.strip("[]() ")) for cell in words)
+    return sum(not _is_usual(cell) for cell in words)
 
 
 def _is_names(cells: Sequence[str]) -> bool:
     """Whether cells are names, and neither units nor numbers nor a line that is drawn."""
-    units = sum(is_usual_unit(cell.strip("[]() ")) for cell in cells)
+    units = sum(_is_usual(cell) for cell in cells)
     words = sum(1 for cell in cells if re.search(r"[^\W\d_]", cell))
     return 2 * units < len(cells) and 2 * words > len(cells)
+
+
+def _is_usual(cell: str) -> bool:
+    """Whether a cell is a unit as drives and programs write it."""
+    unit = cell.strip("[]() ")
+    return is_usual_unit(unit) or bool(units_of(unit))
 
 
 def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
@@ -184,7 +191,7 @@ def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
 def _unit(cell: str) -> str:
     """The unit that a cell is; "" where it is none."""
     unit = cell.strip("[]() ")
-    return unit if is_unit(unit, *_UNITS_OF) or raw_unit(unit) else ""
+    return unit if units_of(unit) or is_unit(unit, *_UNITS_OF) or raw_unit(unit) else ""
 
 
 def _units(rows: Rows, names: Sequence[str]) -> tuple[str, ...]:

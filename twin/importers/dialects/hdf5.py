@@ -18,7 +18,10 @@ from twin.importers.table import (
     require_columns,
     require_fits,
     split_columns,
+    with_unit,
 )
+
+_UNIT = ("units", "unit", "Units", "Unit")  # attributes by which writers state it
 
 
 def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
@@ -44,10 +47,21 @@ def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
                     values, parts = np.asarray(dataset[()]), dataset.dtype.names
                     own = {f"{name}{separator}{part}": values[part] for part in parts or ()}
                     for key, column in (own or {name: values}).items():
-                        columns |= split_columns(key, column)
+                        split = split_columns(key, column)
+                        unit = _unit_of(dataset)
+                        columns |= {with_unit(k, unit, wanted): v for k, v in split.items()}
         require_columns(wanted, {**datasets, **columns})  # lists all there are
         notes = tuple(f"{k}: {v}" for k, v in file.attrs.items() if np.size(v) == 1)
         return SignalTable({name: columns[name] for name in chosen(wanted, columns)}, notes=notes)
+
+
+def _unit_of(dataset: Any) -> str:
+    """The unit that a dataset states, "" where it states none."""
+    for name in _UNIT:
+        stated = np.ravel(dataset.attrs.get(name, ""))
+        if stated.size == 1 and (text := stated[0]):
+            return text.decode(errors="replace") if isinstance(text, bytes) else str(text)
+    return ""
 
 
 DIALECT = Dialect("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), read)

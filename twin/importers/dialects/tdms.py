@@ -7,17 +7,22 @@ from pathlib import Path
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
-from twin.importers.table import SignalTable, chosen, extra, parsing, require_fits
+from twin.importers.table import SignalTable, chosen, extra, parsing, require_fits, with_unit
 
 _PERIOD = "wf_increment"  # s a sample
+_UNIT = "unit_string"
 
 
 def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a TDMS file; raises InputError."""
     nptdms = extra("nptdms")
     with parsing("TDMS"), nptdms.TdmsFile.open(path) as file:
-        channels = {f"{g.name}/{c.name}": c for g in file.groups() for c in g.channels()}
-        read = {name: channels[name] for name in chosen(mapping.column_names(), channels)}
+        asked, every = mapping.column_names(), (c for g in file.groups() for c in g.channels())
+        channels = {
+            with_unit(f"{c.group_name}/{c.name}", str(c.properties.get(_UNIT, "")), asked): c
+            for c in every
+        }
+        read = {name: channels[name] for name in chosen(asked, channels)}
         require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
         periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
         for name, period in periods.items():

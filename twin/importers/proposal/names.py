@@ -31,6 +31,10 @@ _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 _PATH = re.compile(r"[./:](?=[^./:]*[^\W\d_]{2})")
 _TAIL = re.compile(r"(?:\s+in\s+|[_ ,/.]\s*)([A-Za-zµμ°%²]+(?:[_/][A-Za-z]+[2²]?)?)$")
 _PER = re.compile(r"(?i)^(.+?)(?:\s*[/_ ]\s*(s|ms|min|second)|ps)(?:\^?2|²)?$")
+_SHARE = re.compile(
+    r"(?i)^(?:(0[.,]1 ?%|‰|0/00|o/oo|per ?mille?|promille)|%|percent|pct|prozent)"
+    r"(?: (?:[a-z]n|of)?(?: ?rated| ?nominal| ?nenn\w*)?(?: ?torque| ?current| ?\w?moment)?)?$"
+)
 _SQUARED = re.compile(r"(?i)(?:\^?2|²)$")
 _LETTER_OF_AXIS = re.compile(r"^([fmtivpau])([xyz])$")
 AXIS_LETTERS = frozenset("abcxyz")
@@ -164,6 +168,8 @@ def units_of(text: str) -> tuple[tuple[Quantity, str], ...]:
     for spelling in (text, text.lower()):
         if found := _spellings().get(spelling):
             return found
+    if share := _SHARE.match(text):  # of the rated torque: what one of it is, only a scale tells
+        return ((Quantity.DRIVE, "1" if share[1] else "%"),)
     if rate := _PER.match(text):
         of = [u for q, u in units_of(rate[1]) if q is Quantity.POSITION]
         kind = Quantity.ACCELERATION if _SQUARED.search(text) else Quantity.VELOCITY
@@ -208,7 +214,8 @@ def names_of(columns: Sequence[str]) -> dict[str, Name]:
 
 def _name(column: str, shared: frozenset[str]) -> Name:
     bare, written = _unit_in(column)
-    coded = next((found for found in CODES.items() if re.search(found[0], column)), None)
+    open_ = _BRACKETS.sub(" ", column)
+    coded = next((found for found in CODES.items() if re.search(found[0], open_)), None)
     words = words_of(bare) if coded is None else [*coded[1].split(), *_places(column, coded[0])]
     told = [w for w in words if w not in shared or _quantities([w])]
     last = words_of(_PATH.split(bare)[-1]) if coded is None else words

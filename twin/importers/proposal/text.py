@@ -169,11 +169,11 @@ def _of_velocity(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     position = axis.signals["position"]
     base, _ = position_unit(file, axis)
     unit = signal.name.unit
-    if is_raw(base) or is_raw(unit):
+    if is_raw(unit) or (is_raw(base) and unit is None):
         si = "rad/s" if turns(axis) else "m/s"
-        return _without_scale(axis, signal, unit if unit and is_raw(unit) else "counts", si)
+        return _without_scale(axis, signal, unit or "counts", si)
     if unit is not None:
-        ratio = rate_ratio(file, position, signal, base, unit)
+        ratio = 0.0 if is_raw(base) else rate_ratio(file, position, signal, base, unit)
         return MapEntry(signal, unit, _off(ratio, unit, signal.field))
     if (own := customary(signal.name)) is None:
         own = f"{base}/s"
