@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 
 from twin.errors import InputError, at, near
 
+_MCAP = b"\x89MCAP"  # with which a log begins
 NAME_OF_TABLE = "[key]"  # where the library found fault with the name and not what it names
 
 
@@ -50,6 +51,8 @@ def toml_document(path: Path) -> tuple[str, dict[str, Any]]:
     most_bytes = 5_000_000  # of a TOML file
     with path.open("rb") as file:
         content = file.read(most_bytes + 1)
+    if content.startswith(_MCAP):
+        raise InputError("is an MCAP log and no TOML file; a model comes before its logs")
     if len(content) > most_bytes:
         raise InputError(f"is larger than {most_bytes // 10**6} MB; give a TOML file")
     try:

@@ -179,7 +179,9 @@ def _taken(source: Path, found: Proposal, answers: Answers, log: Path, shown: st
     if lacks := found.lacks(answers):
         mapping = log.with_suffix(".map.toml")
         kept = _kept(mapping, text)
-        said = f"{mapping}: the map lacks what is marked NOT KNOWN or '?'; complete it, then"
+        said = (
+            f"{mapping}: the map; the log is not written, for what is said above; mend that, then"
+        )
         said += f"\n  {in_shell('import', source, '--map', mapping, '-o', log)}"
         parts = filter(None, (shown, said))
         return Reply("\n\n".join(parts), map_answer(found, answers), [*kept, *lacks], fine=False)

@@ -122,10 +122,15 @@ class _Run:
                 served.tell_cause(cause, self.watcher.then)
 
     def in_the_end(self) -> Iterator[str]:
-        """The causes, and the parameters as they are in the end."""
-        from identify.output.words.fleet import cause_in_words, parameter_in_words
+        """The causes, what was never as its model, and the parameters as they are in the end."""
+        from identify.output.words.fleet import (
+            cause_in_words,
+            parameter_in_words,
+            unlike_in_words,
+        )
 
         yield from map(cause_in_words, self.causes)
+        yield from (unlike_in_words(name, *both) for name, both in self.watcher.unlike.items())
         for name, axis in self.axes.items():
             for one in axis.parameters:
                 yield f"  {one.name} of axis {name}: {parameter_in_words(one)}"

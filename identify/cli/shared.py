@@ -179,9 +179,11 @@ class CheckedRecordings(Recordings):
     @contextmanager
     def explaining(self) -> Iterator[None]:
         """What goes wrong with the logs meanwhile is told with what the check knows of them."""
+        from numpy.linalg import LinAlgError  # as of numbers that nothing can be computed with
+
         try:
             yield
-        except InputError as error:
+        except (InputError, LinAlgError) as error:
             known = next((f for f in self.findings if ": error: " in f), None)
             if known is None:
                 raise

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from identify.dataset.bodies import bodies_along
 from identify.dataset.given_logs import is_driven, telling_in
 from identify.dataset.motion import motion_of
+from identify.dataset.noise_floor import floor_of
 from identify.dataset.prepared_log import PreparedLog, moving, sticks
 from identify.dataset.readings import ripples_of_widest
 from identify.dataset.test_function import LEAST_BLOCKS
@@ -75,7 +76,8 @@ class Window:
 class Watcher:
     """What is known of a machine that runs: of each axis the force errors of the last windows.
 
-    past: the samples before the next window, at about ``RATE``; then: when these end, s.
+    past: the samples before the next window, at about ``RATE``; then: when these end, s. begun: the
+    error of the first windows over its noise floor.
     """
 
     model: MachineModel
@@ -83,9 +85,21 @@ class Watcher:
     ends: dict[str, list[float]] = field(default_factory=dict)
     slow: dict[str, Recursion] = field(default_factory=dict)
     ripples: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    begun: dict[str, float] = field(default_factory=dict)
     windows: int = 0
     past: Log | None = None
     then: float = 0.0
+
+    @property
+    def unlike(self) -> dict[str, tuple[float, float]]:
+        """By axis that was never as its model: error over noise floor as it began, and in the fit.
+
+        No change tells of it; of a model that was not fitted it is not known.
+        """
+        far = 4.0  # times as far above noise, which another motion alone does to no sound model
+        fits = {axis: own.above_floor for axis, own in self.model.intervals.items()}
+        both = {axis: (ratio, fits[axis]) for axis, ratio in self.begun.items() if axis in fits}
+        return {axis: pair for axis, pair in both.items() if pair[0] > far * max(pair[1], 1.0)}
 
     def take(self, start: float, log: Log) -> Window:
         """What a window tells that begins at a time, s. An axis at rest tells nothing."""
@@ -151,6 +165,8 @@ class Watcher:
         axis, errors = self.model.axes[name], self.errors.get(name, [])
         error = max(float(np.sqrt(np.mean(left[some] ** 2))), LEAST)
         usual = float(np.median(errors)) if len(errors) >= AFTER else None
+        if usual is not None and name not in self.begun:
+            self.begun[name] = usual / floor_of(axis, logs)
         slow = self.slow.setdefault(name, Recursion.of(axis))
         place = logs[0].motion.position
         way = float(np.abs(np.diff(place[round((1.0 - share) * len(place)) :])).sum())

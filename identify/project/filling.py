@@ -121,6 +121,8 @@ def _named(folder: Folder, project: Project, given: Given) -> list[str]:
 
 
 def _exported(folder: Folder, project: Project, given: Given) -> list[str]:
+    if "to" not in given:  # which the command asks for by itself
+        return []
     return [str(folder.free_name("exports", f"{{}}-{Path(given['to']).name}"))]
 
 

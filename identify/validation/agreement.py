@@ -129,6 +129,11 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
     has an interval in both.
     """
     shared = [axis for axis in a.axes if axis in b.axes]
+    if not shared:
+        names = (", ".join(model.axes) for model in (a, b))
+        raise InputError(
+            "the models have no axis in common: one has {}, the other {}".format(*names)
+        )
     axes = {}
     for axis in shared:
         if not all(axis in fit.intervals and fit.intervals[axis].ends for fit in (a, b)):
@@ -138,7 +143,7 @@ def agreement(a: MachineModel, b: MachineModel, catalogue: Catalogue) -> Agreeme
             axes[axis] = _explained(found, a, b, axis, catalogue) if found.differing else found
     if not axes:
         raise InputError(
-            f"{a.name} and {b.name}: no parameter has an interval in both, so nothing can be "
+            "no parameter has an interval in both models, so nothing can be "
             f"compared; {_what_to_do(a, b)}"
         )
     return Agreement(axes, tuple(axis for axis in shared if axis not in axes))

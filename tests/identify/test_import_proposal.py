@@ -84,7 +84,7 @@ def test_what_is_not_known_is_left_open_and_asked_for(tmp_path):
     written(tmp_path, "t,pos [mm],torque [%]", 1e3 * X, F)
     done = twin("import", "run 1.csv", "--yes", folder=tmp_path)
     assert done.returncode == 1
-    assert "complete it, then" in done.stdout
+    assert "the log is not written, for what is said above" in done.stdout
     assert "N for one of torque [%]" in done.stderr
     assert not (tmp_path / "run 1.mcap").exists()
     assert "scale NOT KNOWN: N for one" in (tmp_path / "run 1.map.toml").read_text()

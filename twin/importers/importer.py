@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from twin.errors import InputError, at
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.dialects import all_dialects, find_dialect
-from twin.importers.mapping import ImportMap
+from twin.importers.mapping import ImportMap, load_mapping
 from twin.importers.stamps import with_times
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable, numbers
@@ -44,15 +44,16 @@ Gears = Mapping[str, Mapping[str, float]]  # motor (named as its axis) -> joint 
 _NOTE = "note_"  # entries of a log's metadata: what was done as it was imported
 
 
-def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap) -> Log:
+def import_log(path: str | Path | Sequence[str | Path], mapping: ImportMap | str | Path) -> Log:
     """Read a log of another program as ``mapping`` says; see ``load_mapping``.
 
-    path: the file, or the files in the order of the map's. Samples are in SI, those that delays
-    leave without a partner are cut off at the ends. Raises InputError for a missing file, column or
-    package, a cell that is not a finite number, columns of different length, and times that are not
-    even.
+    path: the file, or the files in the order of the map's. mapping: the map, or its file. Samples
+    are in SI, those that delays leave without a partner are cut off at the ends. Raises InputError
+    for a missing file, column or package, a cell that is not a finite number, columns of different
+    length, and times that are not even.
     """
     paths = [Path(p) for p in ([path] if isinstance(path, str | Path) else path)]
+    mapping = mapping if isinstance(mapping, ImportMap) else load_mapping(mapping)
     if mapping.files:
         return _of_several(paths, mapping)
     if len(paths) != 1:

@@ -221,7 +221,8 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
     if asked and text:
         raise InputError(_of_text(layout, *next(iter(text.items()))))
     where = [k for name, k in places.items() if name not in text]
-    read, more = _rows(path, layout, where, every=not asked)
+    cut = mapping.rows is not None  # what is no number may be in the others
+    read, more = _rows(path, layout, where, every=cut or not asked)
     said = (*layout.said, *more)
     for k in text.values():
         first = next((row[k] for row in layout.rows if k < len(row)), "")
@@ -262,7 +263,7 @@ def _rows(
 ) -> tuple[dict[int, NDArray], tuple[str, ...]]:
     """The columns at some places, and sentences about the lines that are no rows.
 
-    every: all columns are read to be looked at, so that what is no number is NaN there. Raises
+    every: all are read, to be looked at or cut, so that what is no number is NaN there. Raises
     InputError that names all bad cells.
     """
     rows = _Rows(layout, where, _header_cells(path, layout))

@@ -138,6 +138,15 @@ def live_in_words(alarm: LiveAlarm) -> str:
     )
 
 
+def unlike_in_words(axis: str, begun: float, fitted: float) -> str:
+    """That an axis was never as its model; its errors over the noise floor, now and in the fit."""
+    return (
+        f"axis {axis}: its force error is {begun:.3g} times its noise floor from the beginning, "
+        f"{fitted:.3g} times in the fit of the model, which is of another machine, or of another "
+        "state of it: fit it to logs of this one"
+    )
+
+
 def cause_in_words(cause: LiveCause) -> str:
     """What a diagnosis of the minutes after an alarm came to."""
     since = f"axis {cause.axis}, since {cause.changed:.1f} s"

@@ -16,6 +16,7 @@ from identify.fleet.watch import Watcher
 from twin.logs import Log, write_log
 from twin.logs.follow import Follower
 from twin.model.file import load_model
+from twin.model.machine import AxisIntervals
 
 MODEL = load_model(STAGE)
 SINCE, SECONDS = 17.0, 23.0
@@ -27,10 +28,10 @@ def log() -> Log:
     return tracked(MODEL, seed=2, duration=SECONDS)
 
 
-def spoilt(log: Log, size: float) -> Log:
+def spoilt(log: Log, size: float, since: float = SINCE) -> Log:
     """With a force from a time on that no effect of the model makes; N RMS."""
     extra = np.sqrt(2.0) * size * np.sin(2.0 * np.pi * log.axes["x"].position / 0.02)
-    extra *= log.time >= SINCE
+    extra *= log.time >= since
     constant = log.axes["x"].force_constant or 1.0
     per = {"force": 1.0, "current": 1.0 / constant}
     return log.changed(lambda name, c: c + per[name] * extra if name in per else c)
@@ -67,6 +68,17 @@ def test_a_change_of_five_floors_is_told_within_five_seconds_and_no_other(log) -
     assert SINCE < alarm.time <= SINCE + 5.0
     assert abs(alarm.changed - SINCE) <= 1.0
     assert alarm.after > 2.0 * alarm.before
+
+
+@pytest.mark.parametrize(("floors", "unlike"), [(0.0, False), (30.0, True)])
+def test_a_machine_that_was_never_as_its_model_is_told(log, floors, unlike) -> None:
+    """No change tells of it."""
+    fitted = replace(MODEL, intervals={"x": AxisIntervals({}, 1.1)})
+    watcher, other = Watcher(fitted), spoilt(log, floors * FLOOR, since=0.0)
+    for i in range(8):
+        assert not watcher.take(float(i), other.part(1000 * i, 1000 * (i + 1))).alarms
+    assert bool(watcher.unlike) is unlike
+    assert not replace(watcher, model=MODEL).unlike  # which was not fitted
 
 
 def test_a_torn_chunk_and_a_writer_that_begins_anew_are_told_and_followed(log, tmp_path) -> None:

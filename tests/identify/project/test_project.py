@@ -9,7 +9,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from cli_runs import twin
+from cli_runs import refusal, twin
 
 from identify.project import history
 from identify.project.entries import AnswerEntry, ExportEntry, ModelEntry, Project
@@ -145,6 +145,10 @@ def exported(name: str):
     return lambda project: project.model_copy(
         update={"exports": [*project.exports, ExportEntry(format=name)]}
     )
+
+
+def test_what_a_command_asks_for_by_itself_is_said_as_elsewhere(walked):
+    assert "Missing option '--to'" in refusal("export", folder=walked)
 
 
 def test_of_two_writers_neither_overwrites_the_other(tmp_path):

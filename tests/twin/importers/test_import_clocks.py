@@ -174,6 +174,8 @@ def write_two(folder: Path) -> list[Path]:
 def test_two_files_on_one_clock(tmp_path):
     paths = write_two(tmp_path)
     log = import_log(paths, mapping(tmp_path, TWO))
+    (tmp_path / "two.toml").write_text(TWO)
+    assert import_log(paths, tmp_path / "two.toml").metadata == log.metadata
     t = 1.5 + np.arange(len(log)) / 1000.0
     assert len(log) == pytest.approx(1500, abs=2)
     np.testing.assert_allclose(log.axes["x"].position, 1e-3 * np.sin(t), atol=2e-10)

@@ -291,6 +291,20 @@ def test_a_recording_with_holes_is_imported_part_by_part(tmp_path):
         import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [41, 601]\n" + text))
 
 
+def test_rows_that_are_cut_off_need_hold_no_numbers(tmp_path):
+    rows = [f"{4e-3 * k:.3f},{Q[k]},{F[k]}" for k in range(len(Q))]
+    rows[500] = "ERR,ERR,0"
+    rows[20] = f"{4e-3 * 20:.3f},,1"
+    (tmp_path / "a.csv").write_text("\n".join(["t,q,f", *rows]))
+    text = map_of("q", "f", clock="sample_rate = 250.0")
+    with pytest.raises(InputError, match="'ERR'"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, text))
+    log = import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [31, 480]\n" + text))
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * Q[30:480])
+    with pytest.raises(InputError, match="column 'q' is nan in row 1 of 461"):
+        import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [21, 481]\n" + text))
+
+
 def test_a_clock_that_was_put_back_names_the_parts(tmp_path):
     times = np.concatenate([4e-3 * np.arange(400), 4e-3 * np.arange(200)])
     np.savetxt(tmp_path / "a.csv", np.column_stack([times, Q, F]), header="t,q,f",

@@ -137,6 +137,12 @@ def test_nonsense_is_refused_with_what_is_allowed(path, value, message) -> None:
         parse_model(changed(complete(), path, value), CATALOGUE, None, "m.toml")
 
 
+def test_a_log_in_the_place_of_a_model_is_said_to_be_one(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(InputError, match="is an MCAP log and no TOML file; a model comes before"):
+        load_model(tmp_path / "run.mcap", CATALOGUE)
+
+
 @pytest.mark.parametrize(
     "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a = 1\na = 2", "\x00", "[axes.x"]
 )
