@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from identify.dataset.dataset import Dataset, Role, by_log
+from identify.dataset.prepared_log import moving, sticks
 from identify.estimation.confounded import MovedParameter, moved_parameters
+from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit
+from identify.estimation.force_balance import residual
 from identify.estimation.intervals import estimates, intervals_to_keep
 from identify.mechanism.bodies import WrongBody
 from identify.printed import Printed
@@ -28,8 +31,9 @@ class Addition(Printed):
     position_error: free-running RMS error before and after; position_error_in_mujoco: the same
     after, stepped by MuJoCo. Both in the units of the axis, None where the motion is imposed.
     position_error_on: the log that they are of. moved: parameters that the effect changed.
-    set_aside: nonparametric effects that were removed from the model before. notes: what a reader
-    should know beside the errors, one sentence each.
+    set_aside: nonparametric effects that were removed from the model before. in_motion: RMS force
+    error on the training logs before and after where both models tell of them, if one says nothing
+    of rests. notes: what a reader should know beside the errors, one sentence each.
     """
 
     model: MachineModel
@@ -41,6 +45,7 @@ class Addition(Printed):
     moved: tuple[MovedParameter, ...] = ()
     set_aside: tuple[str, ...] = ()
     position_error_on: str | None = None
+    in_motion: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -144,18 +149,28 @@ def addition(
     step = _step(best, base, prepared[name], shape)
     new = model.with_axis(name, prepared[name].kept_in(best.fit.axis)).with_history(step)
     new = new.with_intervals(name, intervals_to_keep(best.fit, estimates(best.fit)))
-    moving, replayed = errors_of_both(model, new, name, prepared)
+    running, replayed = errors_of_both(model, new, name, prepared)
     return Addition(
         model=new,
         step=step,
         candidate=best,
         kept=best.supported,
-        position_error=moving,
+        position_error=running,
         position_error_in_mujoco=replayed,
         moved=moved_parameters(base, best.fit),
         set_aside=tuple(n for n in given.axes[name].names if n not in left),
-        position_error_on=None if moving is None else next(iter(by_log(prepared))),
+        position_error_on=None if running is None else next(iter(by_log(prepared))),
+        in_motion=_in_motion(base, best.fit),
     )
+
+
+def _in_motion(before: Fit, after: Fit) -> tuple[float, float] | None:
+    """Their RMS force errors on what both tell of the training logs; None where each tells all."""
+    if sticks(before.axis) == sticks(after.axis):
+        return None
+    some = moving([*before.logs], sticks=True)
+    first, last = (rms(residual(fit.axis, before.logs)[some]) for fit in (before, after))
+    return first, last
 
 
 def _step(best: Candidate, base: Fit, dataset: Dataset, shape: Reshaped | None) -> HistoryStep:

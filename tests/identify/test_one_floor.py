@@ -35,3 +35,13 @@ def test_every_command_tells_the_same_of_one_log(hidden: str, noise: float) -> N
         assert error == pytest.approx(own.error, rel=1e-3)
     for ratio in (compared.ratio, base.ratio):
         assert ratio == pytest.approx(own.ratio, rel=1e-2)
+
+
+def test_errors_of_models_that_tell_of_other_parts_of_a_log_are_compared_where_both_do() -> None:
+    """A friction that remembers holds at rest too, where one that sticks tells nothing."""
+    model, log = MachineModel("m", {"x": SLIDE}, RATE), logged(SLIDE, Ride(3, 3.0), noise=0.01)
+    bristles, spring = (adding.add(name, model, {"a": log}) for name in ("dahl", "spring"))
+    assert bristles.in_motion is not None
+    assert bristles.in_motion[0] == pytest.approx(bristles.step.fit_error_before, rel=1e-6)
+    assert "where both tell of the training logs it is" in bristles.notes[-2]
+    assert spring.in_motion is None

@@ -264,8 +264,16 @@ def notes_in_words(made: Addition) -> tuple[tuple[str, ...], tuple[str, ...]]:
             f"{', '.join(set_aside)} was removed before {added.effect.name} was added; add it "
             "again for the error that is left"
         )
+    told = list(notes)
+    if made.in_motion:
+        errors = arrow(*made.in_motion, made.units.force)
+        told.append(
+            "one of both models says nothing of rests, so each error above is of its own parts of "
+            f"the logs; where both tell of the training logs it is {errors}"
+        )
     chose = also_chose_in_words(made.reported_on)
-    return tuple(notes), tuple(notes) if chose is None else (*notes, chose)
+    told += [] if chose is None else [chose]
+    return tuple(notes), tuple(told)
 
 
 def also_chose_in_words(on: Role) -> str | None:
