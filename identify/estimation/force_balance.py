@@ -47,6 +47,7 @@ from twin.parallel import spread
 from twin.signals import Array, between
 from twin.threads import trim_beside
 
+LOCKS = 0.8  # of a load: a friction that grows by more of it lets the axis hardly move
 _Along: TypeAlias = Callable[[PreparedLog], Array]
 _Walk: TypeAlias = tuple[list[int], _Along]
 
@@ -125,17 +126,21 @@ def _load(axis: AxisModel, log: PreparedLog) -> Array:
 
 @lru_cache(maxsize=16)  # whatever is walked at the same values of an axis bears the same load
 def _load_of(loading: Valued, mass: float, log: PreparedLog) -> Array:
-    """The load: what all else asks, less the friction under it, by a step of Newton."""
+    """The load: what all else asks, less the friction under it.
+
+    By a step of the secant from no load, which is exact where friction grows in proportion.
+    """
     axis, motion = loading.axis, true_motion(loading.axis, log.motion)[0]
     others = parts_of(axis, *(set(Kind) - {*RUBBING}))
     bodies = log.fine.mean(log.motion.raw[1]) - log.command
     asked = mass * log.acceleration - averaged_force(others, [log]) + bodies
     asked = _sharpened(asked[None], log)[0]
-    rubbing = parts_of(axis, *RUBBING, Kind.SENSING)
-    bare = replace(rubbing, effects=tuple(f for f in rubbing.effects if not f.effect.reads("U")))
-    load = asked - total_force(_table_between(bare), motion)
-    friction, slope = _under_load(_table_between(rubbing), motion, load)
-    return load - (load - asked + friction) / (1.0 + slope)
+    table, none = _table_between(parts_of(axis, *RUBBING, Kind.SENSING)), np.zeros(len(asked))
+    bare = total_force(table, _under(motion, none))
+    load = asked - bare
+    more = total_force(table, _under(motion, load)) - bare
+    slope = np.divide(more, load, out=none, where=load != 0.0)
+    return load - more / (1.0 + np.maximum(slope, -LOCKS))
 
 
 def _loading(axis: AxisModel) -> AxisModel:
@@ -145,10 +150,9 @@ def _loading(axis: AxisModel) -> AxisModel:
 
 def _under_load(table: Table, motion: Motion, load: Array) -> tuple[Array, Array]:
     """The force (n,) N of a friction under a load (n,) N, and how it changes with that."""
-    locks = 0.8  # of a load: a friction that grows by more of it lets the axis hardly move
     step = STEP * (float(np.std(load)) or 1.0)
     now, then = (total_force(table, _under(motion, force)) for force in (load, load + step))
-    return now, np.maximum((then - now) / step, -locks)
+    return now, np.maximum((then - now) / step, -LOCKS)
 
 
 def _sharpened(means: Array, log: PreparedLog) -> Array:
