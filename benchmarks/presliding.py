@@ -1,16 +1,17 @@
 """Stiff contacts under noisy readings: `python -m benchmarks presliding [--seed N] [-o FILE]`.
 
 Twenty axes that rest between moves, each on a contact of micrometres (LuGre, Dahl, GMS, or layers
-that slip one after another), whose readings have noise of 0.3 to 12 % of its bristle. As a user
-goes: a first model of one log (`twin new`), its true law added (`twin add`), whose values are held
-against the true ones, and a diagnosis, which may name that law or one of its kin, and nothing else.
+that slip one after another), whose readings have noise of 0.3 to 12 % of its bristle; and the same
+with an encoder whose steps scatter as much. As a user goes: a first model of one log (`twin new`),
+its true law added (`twin add`), whose values are held against the true ones, and a diagnosis, which
+may name that law or one of its kin, and nothing else.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -19,7 +20,16 @@ import numpy as np
 
 from benchmarks.figures import Figure, Target, report
 from benchmarks.judgement import WRONG, Expected, Row, judged, row_of
-from benchmarks.second_simulator.contacts import DAHL, GMS, KINDS, LAYERS, LUGRE, drawn, log_of
+from benchmarks.second_simulator.contacts import (
+    DAHL,
+    GMS,
+    KINDS,
+    LAYERS,
+    LUGRE,
+    Contact,
+    drawn,
+    log_of,
+)
 from identify.adding import add
 from identify.analysis.first_model import first_model
 from identify.workflow import diagnose
@@ -43,10 +53,10 @@ class Values:
     level: float
 
 
-def row(kind: str, noise: float, seed: int) -> Row:
-    """One contact: the values of its law, and what a diagnosis says."""
+def row(kind: str, noise: float, seed: int, by: Callable[[Contact], Contact]) -> Row:
+    """One contact: the values of its law, and what a diagnosis says; by: its readings."""
     rng = np.random.default_rng([SEED, seed])
-    contact = drawn(kind, noise, rng)
+    contact = by(drawn(kind, noise, rng))
     training, selection, test = (log_of(contact, rng) for _ in range(3))
     begun = process_time()
     model = first_model({"training": training}, "contact", CATALOGUE)
@@ -76,18 +86,41 @@ def _values(axis: AxisModel, effect: str) -> dict[str, float]:
     return dict(axis[effect].values)
 
 
-def jobs_of(seed: int) -> dict[str, Callable[[], Row]]:
-    """A job for each kind of contact and each amount of noise."""
+def noisy(contact: Contact) -> Contact:
+    """As it was drawn."""
+    return contact
+
+
+def stepped(contact: Contact) -> Contact:
+    """With an encoder whose steps scatter as much as the noise that was drawn, and little noise."""
+    return replace(contact, noise=0.03 * contact.noise, step=12.0**0.5 * contact.noise)
+
+
+READINGS = {"": noisy, "steps, ": stepped}  # by what is said before a figure of theirs
+
+
+def jobs_of(seed: int, by: Callable[[Contact], Contact]) -> dict[str, Callable[[], Row]]:
+    """A job for each kind of contact and each amount of noise; by: its readings."""
     pairs = [(kind, noise) for noise in NOISE for kind in KINDS]
     return {
-        f"{kind}, {noise:.2%}": partial(row, kind, noise, 100 * seed + i)
+        f"{kind}, {noise:.2%}": partial(row, kind, noise, 100 * seed + i, by)
         for i, (kind, noise) in enumerate(pairs)
     }
 
 
 def measure() -> list[Figure]:
     """Figures on a seed that decided nothing."""
-    return figures(judged(jobs_of(SEED), None))
+    return of_seed(SEED, None)
+
+
+def of_seed(seed: int, out: Path | None) -> list[Figure]:
+    """The contacts of a seed under noise, and under the steps of an encoder."""
+    found = {said: judged(jobs_of(seed, by), out) for said, by in READINGS.items()}
+    return [
+        replace(figure, what=f"{said}{figure.what}")
+        for said, rows in found.items()
+        for figure in figures(rows)
+    ]
 
 
 def figures(rows: Sequence[Row]) -> list[Figure]:
@@ -115,9 +148,9 @@ def figures(rows: Sequence[Row]) -> list[Figure]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Judge the twenty contacts of a seed."""
+    """Judge the twenty contacts of a seed, read in two ways."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks presliding", description=__doc__)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("-o", "--out", type=Path)
     given = parser.parse_args(arguments)
-    return report(figures(judged(jobs_of(given.seed), given.out)))
+    return report(of_seed(given.seed, given.out))

@@ -29,7 +29,8 @@ class Contact:
     kind: which law. noise: m rms, of a reading. slip: m/s, Stribeck speed. damping: N s/m, of the
     bristle. loop: rad/s. rate: Hz. shares, springs (SLIPS,): parts of the force and of the
     stiffness of the elements. asymmetry: part by which Fc and Fs of a bristle are larger upwards
-    than in the mean. weight: N, against the position, which the controller knows.
+    than in the mean. weight: N, against the position, which the controller knows. step: m, of the
+    encoder; 0 of one that only has noise.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Contact:
     springs: tuple[float, ...]
     asymmetry: float = 0.0
     weight: float = 0.0
+    step: float = 0.0
 
 
 def drawn(kind: str, noise: float, rng: np.random.Generator) -> Contact:
@@ -80,6 +82,7 @@ def log_of(contact: Contact, rng: np.random.Generator) -> Log:
     values = np.array([
         contact.mass, contact.coulomb, contact.static, contact.stiffness, contact.slip,
         contact.damping, contact.viscous, contact.loop, contact.asymmetry, contact.weight,
+        contact.step,
     ])  # fmt: skip
     read, command = _simulate(
         kind, values, np.array(contact.shares), np.array(contact.springs), path,
@@ -105,12 +108,14 @@ def _moves(rate: float, rng: np.random.Generator) -> np.ndarray:
 @numba.njit(cache=True)
 def _simulate(kind, values, shares, springs, path, speed, noise, period):  # pragma: no cover
     """Readings m and commands N, a sample each; the command is held over the sample."""
-    mass, coulomb, static, stiffness, slip, damping, viscous, loop, asymmetry, weight = values
+    mass, coulomb, static, stiffness, slip, damping, viscous, loop, asymmetry, weight, step = values
     read, command = np.zeros(len(path)), np.zeros(len(path))
     x, v, z, h = path[0], 0.0, 0.0, period / STEPS
     f, seen, last = np.zeros(len(shares)), 0.0, path[0]
     for k in range(len(path)):
         read[k] = x + noise[k]
+        if step > 0.0:
+            read[k] = np.round(read[k] / step) * step
         seen += LOWPASS * ((read[k] - last) / period - seen)
         last = read[k]
         wanted = loop * (path[k] - read[k]) + 1.2 * (speed[k] - seen)

@@ -337,6 +337,7 @@ def motion_of(
     position, weight = together(readings, log.axes[axis].columns.get("velocity"), log.period)
     ripples = ripple_periods(position) if ripples is None else ripples
     noise = white_noise(position - ripple(position, ripples))
+    step = resolution_of(np.diff(readings))
     block = _block_samples(position, min(noise, encoder_noise), log.period, longest_block)
     whole = (len(position) - 1) // block * block
     if bodies is not None:
@@ -361,12 +362,15 @@ def motion_of(
         other_units=LINEAR if other is None else other.units,
         beside=found if several else {},
         position_noise=noise,
-        count=resolution_of(np.diff(readings)) or count_of(readings),
+        count=step or count_of(readings),
         follows=_follows(log.axes[axis]),
         velocity_weight=weight,
         ripples=ripples,
         bodies=None if bodies is None else bodies.during(slice(whole)),
-        path=Path(columns.readings, block, log.period, min(noise, encoder_noise)),
+        # of a step nothing is told, however little noise turns one over
+        path=Path(
+            columns.readings, block, log.period, max(min(noise, encoder_noise), step / 12.0**0.5)
+        ),
         clipped=None if clipped is None else clipped[:whole],
     )
 

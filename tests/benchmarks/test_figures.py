@@ -34,14 +34,10 @@ def test_a_target_is_an_interval_with_its_ends(target, met, missed, words):
     assert [Figure("w", v, target=target).verdict for v in (met[0], missed[0])] == ["pass", "FAIL"]
 
 
-# Tables of earlier versions, as RESULTS.md says of each, until `make bench` measures them again.
-OLDER = {"Self-test", "Second simulator"}
-
-
-def test_a_table_is_of_this_minor_version_unless_it_is_known_to_be_older():
+def test_a_table_is_of_this_minor_version():
     now = Origin.now().minor
     tables = {title: Origin(**t["origin"]) for title, t in kept_tables(RESULTS).items()}
-    assert {title.split(":")[0] for title, o in tables.items() if o.minor < now} == OLDER
+    assert not [title for title, origin in tables.items() if origin.minor < now]
     text = (RESULTS / "RESULTS.md").read_text(encoding="utf-8")
     assert all(f"## {title}\n\n{origin}\n" in text for title, origin in tables.items())
 
