@@ -46,17 +46,20 @@ def add(
     holdout: GivenLogs | None = None,
     test: GivenLogs | None = None,
     *,
+    catalogue: Catalogue | None = None,
     axis: str | None = None,
     test_function: float | None = None,
     progress: Progress = silent,
 ) -> Addition:
     """Add an effect to the axis that it helps most (or to ``axis``), refit and record the errors.
 
-    Nonparametric effects of the model are removed before a physical effect is added. Raises
+    Nonparametric effects of the model are removed before a physical effect is added. catalogue: of
+    the effects that a name or the model's file names, the package's own where None. Raises
     InputError where the axis has the effect already.
     """
-    model = as_model(model)
-    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
+    known = load_catalogue() if catalogue is None else catalogue
+    model = as_model(model, known)
+    effect = known[effect] if isinstance(effect, str) else effect
     model.require_usable(effect, axis or next(iter(model.axes)))
     given, model = model, model if effect.is_nonparametric else physics_alone(model)
     read = as_given(model, logs, holdout, test)
@@ -174,15 +177,18 @@ def correct_body(
     test: GivenLogs | None = None,
     *,
     file: str,
+    catalogue: Catalogue | None = None,
     test_function: float | None = None,
     progress: Progress = silent,
 ) -> CorrectedBody:
     """The inertia that bodies have by the logs, written into a copy of the machine's MuJoCo file.
 
-    file: name of the copy. Raises InputError where the axes are no joints, and where the logs prove
-    no body to be another than in the file.
+    file: name of the copy. catalogue: effects beside which bodies are judged, the package's own
+    where None. Raises InputError where the axes are no joints, and where the logs prove no body to
+    be another than in the file.
     """
-    model = as_model(model)
+    known = load_catalogue() if catalogue is None else catalogue
+    model = as_model(model, known)
     if not model.joints:
         raise InputError(
             f"{model.name}: link_mass corrects a body of a MuJoCo file, and its axes are no joints "
@@ -191,7 +197,7 @@ def correct_body(
     before = fit(
         physics_alone(model), logs, holdout, test, test_function=test_function, progress=progress
     )
-    found = departures_of(before.model, before.fits, before.datasets, load_catalogue(), progress)
+    found = departures_of(before.model, before.fits, before.datasets, known, progress)
     if not found.bodies:
         raise InputError(
             f"{model.mjcf_name}: the logs prove no body to correct it; `twin diagnose` says what "
@@ -210,6 +216,7 @@ def remove(
     holdout: GivenLogs | None = None,
     test: GivenLogs | None = None,
     *,
+    catalogue: Catalogue | None = None,
     axis: str | None = None,
     test_function: float | None = None,
     progress: Progress = silent,
@@ -219,7 +226,7 @@ def remove(
     effect: its name in the model. axis: needed where several have it. Raises InputError where no
     axis has it, or several have.
     """
-    model = as_model(model)
+    model = as_model(model, catalogue)
     names = [axis] if axis else list(model.axes)
     having = [name for name in names if effect in model.axis(name).names]
     if len(having) != 1:
@@ -250,6 +257,7 @@ def add_shape(
     holdout: GivenLogs | None = None,
     test: GivenLogs | None = None,
     *,
+    catalogue: Catalogue | None = None,
     axis: str | None = None,
     test_function: float | None = None,
     progress: Progress = silent,
@@ -261,8 +269,9 @@ def add_shape(
     its law assumes no curve, where the axis has a free curve already, and where the logs ask for
     none.
     """
-    model = as_model(model)
-    effect = load_catalogue()[effect] if isinstance(effect, str) else effect
+    known = load_catalogue() if catalogue is None else catalogue
+    model = as_model(model, known)
+    effect = known[effect] if isinstance(effect, str) else effect
     names = having_shape(effect, model, axis)
     before = fit(model, logs, holdout, test, test_function=test_function, progress=progress)
     fits = {n: before.fits[n] for n in names if n in before.fits}

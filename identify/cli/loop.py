@@ -263,7 +263,9 @@ def add(
         job = partial(adding.add_found, with_all, test_function=test_function)
     elif effect == LINK_MASS:
         file = _copy_of(machine, out).name
-        job = partial(adding.correct_body, file=file, test_function=test_function)
+        job = partial(
+            adding.correct_body, file=file, catalogue=catalogue, test_function=test_function
+        )
     else:
         call = adding.add_shape if shape else adding.add
         job = partial(call, catalogue[effect], axis=axis, test_function=test_function)
