@@ -36,9 +36,9 @@ def attach(mount, values):
 
 
 def frequencies(e: Excitation) -> tuple[float, ...]:
-    """Frequencies to try: steps of a fifth, from what the log's length resolves."""
-    lowest = max(0.3, 2.0 / e.duration)
-    return tuple(lowest * 1.2**k for k in range(max(int(log(20.0 / lowest) / log(1.2)), 1)))
+    """Frequencies to try: steps of a fifth, of what the log's length and its samples resolve."""
+    lowest, highest = max(0.3, 2.0 / e.duration), min(100.0, 0.25 / e.period)
+    return tuple(lowest * 1.2**k for k in range(max(int(log(highest / lowest) / log(1.2)) + 1, 1)))
 
 
 EFFECT = Effect(
