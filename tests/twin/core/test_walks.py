@@ -8,6 +8,7 @@ from identify.dataset.blocks import Blocks
 from identify.dataset.motion import Motion
 from identify.dataset.prepared_log import total_force, total_forces
 from twin.core.native import Table, build_table
+from twin.core.settling import settle
 from twin.core.walks import averaged_columns, reading_columns, walk, walk_sensing
 from twin.effect import Effect, Kind
 from twin.model.machine import AxisModel, Fitted, axis_table
@@ -49,6 +50,24 @@ def by_effect(table: Table, along: Motion) -> Array:
         along.signals, along.others, along.period, 0, rows, table.masses[0], along.time_origin,
     )  # fmt: skip
     return rows.sum(axis=0)
+
+
+def test_what_a_contact_holds_at_rest_balances_the_push() -> None:
+    """Where the readings tell no motion, and less than the contact can hold pushes."""
+    dahl = Fitted.at_start(CATALOGUE["dahl"], {"Fc": 8.0, "sigma2": 0.0, "sigma0": 2e6})
+    table, n = axis_table({"": AxisModel(5.0, effects=(dahl,))}), 90
+    rest, nothing, first, last, at = np.zeros((3, n)), np.zeros((3, n)), *table.axes[0][:3]
+    pushed = np.repeat([3.0, -5.0, 7.0], 30)
+    for room, holds in ((1e-3, pushed), (0.0, np.zeros(n))):
+        moved = settle(
+            table, rest, nothing, pushed, np.zeros(n), np.ones(n, bool), room, 1.0, PERIOD, 0.0
+        )  # fmt: skip
+        rows = np.zeros((len(table.entries), n))
+        walk(
+            table.entries, first, last, table.parameters, np.zeros(table.n_states), at,
+            np.stack([rest[0], moved / PERIOD, rest[0]]), nothing, PERIOD, 0, rows,
+        )  # fmt: skip
+        assert rows.sum(axis=0)[29::30] == pytest.approx(-holds[29::30], abs=0.05)
 
 
 @pytest.mark.parametrize("effect", PHYSICS, ids=lambda e: e.name)
