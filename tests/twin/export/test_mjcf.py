@@ -11,7 +11,7 @@ from cli_runs import refusal, twin
 
 from twin.export.formats.mjcf import attributes_of, export
 from twin.model.file import save_model
-from twin.model.machine import AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisIntervals, AxisModel, Fitted, MachineModel
 
 COMMENTED = ARM.replace(
     '<joint name="elbow"', "<!-- <joint name='elbow'/> as drawn -->\n          <joint name='elbow'"
@@ -118,6 +118,19 @@ def test_comments_and_order_stay_and_what_was_there_of_friction_goes():
     np.testing.assert_allclose(built.dof_frictionloss, COULOMB)
     np.testing.assert_allclose(np.ravel(built.dof_damping)[: len(VISCOUS)], VISCOUS)
     np.testing.assert_array_equal(built.dof_armature, [0.5, 0.0, 0.0])  # no effect is about it
+
+
+@pytest.mark.parametrize(("low", "high"), [(6.5, 7.5), (6.5, 7.0), (7.0, 7.5), (6.5, 6.95)])
+def test_a_value_of_the_file_that_a_fit_does_not_refuse_stays(low, high):
+    """7 N m s of damping in the file, whose interval by the fit has these ends."""
+    own = model()
+    friction = fitted("coulomb_viscous", Fc=2.1, Fs=2.1, sigma2=6.9)
+    base = replace(own.axes["base"], effects=(friction,))
+    ends = {"coulomb_viscous.sigma2": (low, high)}
+    own = replace(own.with_axis("base", base), intervals={"base": AxisIntervals(ends, 1.0)})
+    built = mujoco.MjModel.from_xml_string(export(own, {}).files["arm.xml"])
+    assert np.ravel(built.dof_damping)[0] == (7.0 if low <= 7.0 <= high else 6.9)
+    assert built.dof_frictionloss[0] == pytest.approx(2.1)  # without an interval
 
 
 def test_springs_and_rotors_are_joints_own_also_in_degrees():
