@@ -28,6 +28,7 @@ from arms import (
 from cli_runs import refusal, twin
 from strict_json import valid
 
+from identify.adding import correct_body
 from identify.analysis.first_model import first_model
 from identify.analysis.recording import misassigned
 from identify.dataset.preparation import datasets
@@ -380,6 +381,19 @@ def loaded(model: mujoco.MjModel) -> None:
 def heavier_upper_arm(model: mujoco.MjModel) -> None:
     """By 15 % of its mass."""
     model.body_mass[model.body("upper").id] *= 1.15
+
+
+def test_a_body_is_corrected_beside_the_effects_that_are_given(folder):
+    logs = [arm_log(seed, change=loaded) for seed in (11, 12)]
+    given = load_model(folder / "arm.toml")
+    made = correct_body(given, {"a": logs[0]}, {"b": logs[1]}, file="heavier.xml", catalogue=FEW)
+    assert (made.body.body, made.model.mjcf_name) == ("fore", "heavier.xml")
+    assert made.given.mjcf_name == "arm.xml"
+    heavy = mujoco.MjModel.from_xml_string(made.model.mjcf)
+    light = mujoco.MjModel.from_xml_string(ARM)
+    added = heavy.body("fore").mass - light.body("fore").mass
+    assert added == pytest.approx(0.5, rel=0.02)
+    assert heavy.body("upper").mass == light.body("upper").mass
 
 
 @pytest.mark.slow
