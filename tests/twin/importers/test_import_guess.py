@@ -1,6 +1,7 @@
 """A proposed map reads the file that it was proposed for, and says what it assumes."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -378,6 +379,12 @@ def test_units_below_the_names_may_be_those_of_a_drive(tmp_path, position, rate,
     found = guess_map(tmp_path / "a.csv").text
     assert said in found
     assert ("N m for one" in found) is (force != "Nm")
+    told = re.search(r"counts_per_turn NOT KNOWN.*, about (\d+) by v \[1/min\]", found)
+    if position == "Inkr":
+        assert told
+        assert int(told[1]) == pytest.approx(65536, rel=1e-3)
+    else:
+        assert told is None
 
 
 def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tmp_path):

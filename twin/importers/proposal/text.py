@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -134,8 +135,21 @@ def _of_channel(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
 def _of_position(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
     unit, stated = position_unit(file, axis)
     if is_raw(unit):
-        return _without_scale(axis, signal, unit, _angle_or_length(axis))
+        how = _by_velocity(file, axis, signal, unit)
+        return _without_scale(axis, signal, unit, _angle_or_length(axis), how)
     return MapEntry(signal, unit) if stated else _assumed(axis, signal, unit)
+
+
+def _by_velocity(file: File, axis: ProposedAxis, position: Signal, unit: str) -> str:
+    """How many of a counted position a velocity in a stated unit makes a turn, or a metre."""
+    velocity = axis.signals.get("velocity")
+    if velocity is None or velocity.name.unit is None or is_raw(velocity.name.unit):
+        return ""
+    one = rate_ratio(file, position, velocity, unit, velocity.name.unit)  # rad or m for a count
+    if one == 0.0:
+        return ""
+    whole = (2.0 * math.pi if is_unit(velocity.name.unit, "rad/s") else 1.0) / abs(one)
+    return f"about {whole:.0f} by {velocity.column}"
 
 
 def _angle_or_length(axis: ProposedAxis) -> str:
