@@ -26,7 +26,13 @@ from identify.dataset.readings import (
     ripples_of_widest,
     together,
 )
-from identify.dataset.spectrum import MOST_LINES, ScatteredSignal, find_lines, lines_in_time
+from identify.dataset.spectrum import (
+    MOST_LINES,
+    ScatteredSignal,
+    find_lines,
+    lines_in_time,
+    strongest_line,
+)
 from identify.estimation.fit import fit_axis
 from identify.selection.diagnosis import Verdict, diagnose_axis
 from twin.effects import Catalogue
@@ -305,3 +311,15 @@ def test_a_ripple_of_the_reading_is_found_at_its_period():
     assert ripples([loud])[0] == pytest.approx(pitch, rel=3e-3)
     still = replace(SHORT, track=Blocks(SHORT.signals * [[0.0], [1.0], [1.0]], SHORT.raw))
     assert ripples([still]) == ()
+
+
+@pytest.mark.parametrize("height", [1.0, 0.3, 0.05])
+def test_the_strongest_line_has_its_frequency_and_its_share_of_the_variance(height):
+    """Of one that is too weak to count, the transform alone tells it."""
+    x = np.sort(np.random.default_rng(3).uniform(0.0, 0.4, 4000))
+    noise = 0.2 * np.random.default_rng(4).standard_normal(len(x))
+    sine = height * np.sin(2.0 * np.pi * 137.0 * x + 0.4)
+    frequency, share = strongest_line(ScatteredSignal(x, sine + noise), 20.0, 400.0, 0.5)
+    true = np.mean(sine**2) / np.mean((sine + noise) ** 2)
+    assert frequency == pytest.approx(137.0, abs=1.5)
+    assert true / 2.0 < share + 1e-3 < 1.5 * true + 2e-3
