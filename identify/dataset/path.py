@@ -89,14 +89,6 @@ class Path:
         x = np.pad(self.readings, around, mode="edge")
         return np.asarray(_span(x, 2 * around + 1) < self.room)
 
-    def borne_at_rest(self, force: Array) -> Array:
-        """A force (n,) N, where the axis stands as its laws bear it: inertia bears what is fast."""
-        # half the shortest test function, which is longer than the period of a stiff contact
-        around = np.ones(2 * round(0.25 * SHORTEST / (self.period * self.samples)) + 1)
-        weight = np.maximum(np.convolve(self.stands, around, "same"), 1.0)
-        mean = np.convolve(force * self.stands, around, "same") / weight
-        return np.where(self.stands, mean, force)
-
     def during(self, first: int, end: int) -> Path:
         """The same of the samples from one to another."""
         return replace(self, readings=self.readings[first : end + 1])

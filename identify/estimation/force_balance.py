@@ -210,8 +210,8 @@ def _settled(own: Valued, log: PreparedLog) -> PreparedLog:
         acting = acting.with_force(actual_force(axis, acting))
     signals = driven.joint_signals if table.reads_joints else driven.signals
     moved = settle(
-        table, signals, driven.others, path.borne_at_rest(acting.net),
-        driven.followed, path.stands, path.room, SHORTEST, motion.period, motion.time_origin,
+        table, signals, driven.others, acting.net, driven.followed, path.stands, path.room,
+        SHORTEST, motion.period, motion.time_origin,
     )  # fmt: skip
     slip = Slip(moved / motion.period, path.stands & (moved != 0.0))
     return replace(log, motion=replace(motion, slip=slip))

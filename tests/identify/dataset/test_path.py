@@ -57,7 +57,7 @@ def test_the_steps_of_an_encoder_move_no_contact(step, seed):
     log = logged_by_steps(step, seed)
     assert compare(dahl(STIFFNESS), log, test_function=0.05).axes["q"].total_error < 0.12
     found = fit(dahl(STIFFNESS / 4.0), log).model.axes["q"]["dahl"].values
-    assert found["sigma0"] == pytest.approx(STIFFNESS, rel=0.1)
+    assert found["sigma0"] == pytest.approx(STIFFNESS, rel=0.05)
 
 
 def left(model, *logs):
