@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -32,6 +31,7 @@ from identify.cli.shared import (
     app,
     loaded,
     said_of,
+    source_of,
     tell_first_look,
     with_logs,
     written,
@@ -117,7 +117,7 @@ def compare(
     done = with_logs(job, machine, logs)
     writes: list[Callable[[], object]] = []
     if html:
-        source = _source(model, test_function, effects)
+        source = source_of(model, test_function, effects)
         writes.append(partial(_report, html, source, done, logs))
     if mcap:
         writes.append(lambda: workflow.side_by_side_of(done.result).write(mcap))
@@ -154,7 +154,7 @@ def diagnose(
     job = partial(workflow.diagnose, catalogue=catalogue, test_function=test_function)
     done = with_logs(job, machine, logs, holdout, test, fits=True)
     source = replace(
-        _source(model, test_function, effects), written=str(better) if better else None
+        source_of(model, test_function, effects), written=str(better) if better else None
     )
     writes: list[Callable[[], object]] = []
     if html:
@@ -177,15 +177,6 @@ def _of_rotors(machine: MachineModel, logs: Sequence[Path]) -> list[str]:
 
     first = Recordings(logs[:1])[str(logs[0])]
     return [rotor_in_words(found, machine) for found in rotors_before_gears(machine, first)]
-
-
-def _source(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
-    """The command as typed, and what the next one takes over of it."""
-    from identify.output.words.next_step import Source
-
-    length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
-    own = [text for file in effects or () for text in ("--effects", str(file))]
-    return Source(shlex.join(["twin", *sys.argv[1:]]), model, options=(*length, *own))
 
 
 def _save_with_bodies(made: MachineModel, out: Path, given: MachineModel) -> None:
@@ -493,7 +484,7 @@ def demo(
     machine, catalogue = loaded(model, effects)
     line = partial(print, file=sys.stderr if ctx.params["as_json"] else sys.stdout, flush=True)
     with progress_on_stderr() as progress:
-        source = _source(model, None, effects)
+        source = source_of(model, None, effects)
         result = run(machine, catalogue, folder, seed, source, line, progress)
     hidden = result.hidden.effect.name
     answer = DemoAnswer.of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -18,6 +19,7 @@ from twin.errors import InputError
 from twin.telling import heard
 
 if TYPE_CHECKING:
+    from identify.output.words.next_step import Source
     from twin.effects import Catalogue
     from twin.logs import Log
     from twin.model.machine import MachineModel
@@ -252,6 +254,15 @@ def tell_first_look(model: MachineModel, logs: Sequence[Path], catalogue: Catalo
             return
         if found := first_look(model, logs[0], catalogue=catalogue):
             typer.echo(f"twin: {first_look_in_words(str(logs[0]), found)}", err=True)
+
+
+def source_of(model: str, test_function: float | None, effects: list[Path] | None) -> Source:
+    """The command as typed, and what the next one takes over of it."""
+    from identify.output.words.next_step import Source
+
+    length = [] if test_function is None else ["--test-function", f"{test_function:g}"]
+    own = [text for file in effects or () for text in ("--effects", str(file))]
+    return Source(shlex.join(["twin", *sys.argv[1:]]), model, options=(*length, *own))
 
 
 def said_of(result: Any, warnings: Sequence[str] = (), fine: bool = True, **more: Any) -> Reply:

@@ -56,7 +56,9 @@ def test_what_came_near_is_compared_again_beside_the_other_of_a_pair() -> None:
     model = first_model({"log": logs[0]}, "cart", CATALOGUE)
     known = few("coulomb_viscous", "encoder_delay", "actuator_lag", "lugre")
     found = identify.diagnose(model, *logs, catalogue=known).axes["q"]
-    assert [s.change.name for s in found.steps][:2] == ["encoder_delay", "lugre"]
+    assert [(s.change.name, s.with_others) for s in found.steps] == [
+        ("encoder_delay", True), ("lugre", True), ("actuator_lag", False),
+    ]  # fmt: skip
     named = {f.effect: f.parameters for f in found.findings}
     assert named.keys() == {"actuator_lag", "lugre"}
     assert named["actuator_lag"]["tau"] == pytest.approx(plant.lag, rel=0.06)

@@ -25,7 +25,7 @@ def motion_of_force(axis: AxisLog) -> Explained | None:
 def doubts_as_metadata(log: Log) -> dict[str, str]:
     """What the signals of a log contradict: signs, exchanged columns, sizes; a sentence each.
 
-    As entries of the log's metadata, "doubt.x.0", which a check reads;
+    As entries of the log's metadata, which a check reads: "doubt.x.0", and
     "partial.x" where a part of the force of an axis is missing for sure: it does work on friction,
     which the others of a machine with several may do. Of an axis whose counter begins again that is
     told, and nothing else is.
