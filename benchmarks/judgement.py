@@ -14,6 +14,7 @@ from identify.dataset.preparation import datasets
 from identify.estimation.alignment import fit_aligned
 from identify.estimation.errors import error_if_any
 from identify.estimation.fit import Fit
+from identify.output.words.refusal import refusal_in_words
 from identify.selection.candidates import Candidate
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.findings import Finding, FindingKind
@@ -91,7 +92,7 @@ def row_of(case: str, expected: Expected, found: AxisDiagnosis, seconds: float) 
         "findings": findings,
         "small": list(found.also_seen),
         "contradicted": [f.effect for f in found.contradicted],
-        "doubted": dict(found.doubted),
+        "doubted": {name: refusal_in_words(why) for name, why in found.doubted.items()},
         "unit": found.dataset.units.force,
         "floor": found.base.floor,
         "errors": {
@@ -133,7 +134,7 @@ def _candidate(candidate: Candidate) -> Row:
     gain, score = candidate.gain, candidate.score
     return {
         "effect": candidate.effect.name,
-        "refused": candidate.refused,
+        "refused": candidate.refused and refusal_in_words(candidate.refused),
         "promise": None if score else 1.0 - (gain.after / gain.before) ** 2,
         "part": score.part if score else None,
         "t": score.t if score else None,

@@ -19,7 +19,7 @@ thresholds (``RULE``), less strictly where all other logs prove a change, choosi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import NormalDist
 
@@ -42,10 +42,12 @@ from identify.estimation.evidence import (
 from identify.estimation.fit import Fit, has_nonparametric, smoothing
 from identify.estimation.force_balance import residual
 from identify.rules import RULE
+from identify.selection.refusal import ByChance, Refusal, TakesLittle, Uncertain
 
 Array = NDArray[np.float64]
 
 TINY = np.finfo(float).tiny  # N^2, of a residual that is nothing
+FEWEST_TURNS = 2  # other logs that prove a law: with those that choose most of all logs see it
 IN_OTHERS = 0.5  # of what a finding takes: fitted to other logs, it may make as much more or less
 
 
@@ -116,20 +118,16 @@ class Score:
         return self.part > max(IN_OTHERS * RULE.least_part, self.control) and self.t > 0.0
 
     @property
-    def refused(self) -> str | None:
-        """Why the change is not accepted, in words; None where it is."""
+    def refused(self) -> Refusal | None:
+        """Why the change is not accepted; None where it is."""
         if self.in_turn is not None and self.is_seen:
             return None
         if self.part < RULE.least_part:
-            return f"takes {100.0 * max(self.part, 0.0):.0f} % of what is left"
+            return TakesLittle(self.part)
         for t, least in ((self.t, least_t(1)), (self.together, least_t(self.among))):
             if t < least:
-                return f"gain uncertain: t = {t:.1f}, where {least:.1f} is sure"
-        if self.part <= self.control:
-            return (
-                f"shifted in time, where it cannot be real, it takes {100.0 * self.control:.0f} %"
-            )
-        return None
+                return Uncertain(t, least)
+        return ByChance(self.control) if self.part <= self.control else None
 
     @property
     def accepted(self) -> bool:
@@ -238,9 +236,15 @@ def left_on(fit: Fit, logs: Sequence[PreparedLog]) -> Array:
     return np.where(kept, residual(fit.axis, logs), np.nan)
 
 
-def least_of(turns: Sequence[Score]) -> Taken:
-    """The least that a change takes of logs that choose in turn."""
-    return min((s.other for s in turns), key=lambda taken: taken.t)
+def proved_in_turn(turns: Sequence[Score | None]) -> Taken | None:
+    """The least that a change takes of logs that choose in turn, where all of them prove it.
+
+    turns: its score, asked alone, where each of them chooses; None where it was not asked there.
+    """
+    scores = [s for s in turns if s is not None and replace(s, among=1).accepted]
+    if not FEWEST_TURNS <= len(scores) == len(turns):
+        return None
+    return min((s.other for s in scores), key=lambda taken: taken.t)
 
 
 def least_t(among: int) -> float:

@@ -29,46 +29,23 @@ from identify.estimation.least_squares import orthonormal, unabsorbed
 from identify.estimation.scaling import AT_EDGE
 from identify.rules import RULE
 from identify.selection.acceptance import Judged, Score, Taken, score
+from identify.selection.refusal import (
+    EndsAtBound,
+    Instead,
+    OutsideKnee,
+    Refusal,
+    is_of_position,
+)
 from identify.selection.what import What
 from twin.curve import Coordinate
 from twin.effect import Effect, Excitation, Kind
-from twin.knee import Imitated, Imitation
+from twin.knee import Imitation
 from twin.model.machine import AxisModel, Fitted
 
 Array = NDArray[np.float64]
 
 MOTION = ("position", "velocity", "acceleration", "direction")
 SAME_FORCE = 0.5  # of a force's square; where the motion leaves less of it, it is one of the motion
-NO_SCORE = "by one linear step it gains too little"
-SMALL_NOISE = "its noise is no good part of the error, or more than it"
-
-
-@dataclass(frozen=True)
-class NotItself:
-    """Why the values that a law was fitted with cannot be its own, in words.
-
-    imitated: what it is on this motion, where that is another law.
-    """
-
-    why: str
-    imitated: Imitated | None = None
-
-    @classmethod
-    def imitating(cls, imitation: Imitation, axis: AxisModel) -> NotItself:
-        """Of an effect of an axis that is another law there."""
-        knee, unit = imitation.knee, axis.units(imitation.knee.unit)
-        size, edge = (
-            f"{v:.3g} {unit}".removesuffix(" 1") for v in (imitation.size, imitation.edge)
-        )
-        side = "below" if imitation.size < imitation.edge else "beyond"
-        value, is_here = "" if size == edge else f" of {size}", imitation.of
-        why = f"its {knee.name}{value} is {side} {edge}, so that it is {is_here.value} here"
-        return cls(why, is_here)
-
-    @property
-    def is_of_position(self) -> bool:
-        """Whether it is a force of position all the same."""
-        return self.imitated is Imitated.OF_POSITION
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,7 +64,7 @@ class Candidate:
     evidence: Evidence
     gain: Gain
     score: Score | None = None
-    doubt: NotItself | None = None
+    doubt: Refusal | None = None
 
     @classmethod
     def screened(cls, before: Judged, fit: Fit, effect: Effect, promise: float) -> Candidate:
@@ -105,11 +82,12 @@ class Candidate:
         return self.evidence.delta_bic
 
     @property
-    def refused(self) -> str | None:
-        """Why the data do not prove it, in words; None where they do."""
+    def refused(self) -> Refusal | None:
+        """Why the data do not prove it; None where they do."""
         if self.score is None:
-            return SMALL_NOISE if self.effect.is_noise else NO_SCORE
-        return self.doubt.why if self.doubt else self.score.refused
+            noise = self.effect.is_noise
+            return Instead.ERROR_OF_ANOTHER_SIZE if noise else Instead.NO_REFIT
+        return self.doubt or self.score.refused
 
     @property
     def supported(self) -> bool:
@@ -124,13 +102,18 @@ class Candidate:
     @property
     def is_of_position(self) -> bool:
         """Whether the data prove its force, and of that no more than that it is one of position."""
-        alike = self.doubt is not None and self.doubt.is_of_position
-        return alike and self.is_proved and self.effect.kind is Kind.FORCE
+        force = self.effect.kind is Kind.FORCE
+        return force and self.is_proved and is_of_position(self.doubt)
 
     @property
     def part(self) -> float:
         """Part of the error above the floor that it takes; 0 where it was not refitted."""
         return self.score.part if self.score else 0.0
+
+    @property
+    def in_turn(self) -> Taken | None:
+        """The least that it takes where other logs prove it, choosing in turn."""
+        return self.score.in_turn if self.score else None
 
     @property
     def is_noise(self) -> bool:
@@ -162,7 +145,7 @@ def candidate_of(
     )
 
 
-def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotItself | None:
+def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> Refusal | None:
     """Why the values that an effect was fitted with cannot be its own; None where they can.
 
     A value that ended at a bound belongs to another law, whatever the bound's sign; a strength at
@@ -172,27 +155,23 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> NotIt
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
         if imitation := imitation_of(fitted, ended, dataset.excitation):
-            return NotItself.imitating(imitation, fit.axis)
+            return OutsideKnee.imitating(imitation, fit.axis)
         if ended:
-            return NotItself(f"{' and '.join(ended)} {'end' if ended[1:] else 'ends'} at a bound")
+            return EndsAtBound(tuple(ended))
         alone = replace(fit.axis, effects=(fitted,))
         if depends_on_time_origin(alone, dataset) and _follows_motion(alone, dataset):
-            return NotItself(
-                "the motion repeats with it, so that any force of the motion could be it"
-            )
+            return Instead.ANY_FORCE_OF_THE_MOTION
         own_force = effect.kind is Kind.FORCE and not effect.of_joints
         if _may_be_of_bodies(alone, dataset):
-            return NotItself(
-                "a tenth more or less of what the bodies of the file weigh could be it"
-            )
+            return Instead.WEIGHT_OF_BODIES
         if own_force and _is_between_knots(fitted, fit.axis, dataset):
-            return NotItself("a free curve beside it may miss as much between its knots")
+            return Instead.CURVE_BETWEEN_KNOTS
         if own and effect.kind is Kind.FORCE and _is_the_friction(alone, before, fit):
-            return NotItself("it takes the place of the friction, which another friction would")
+            return Instead.FRICTION
     if _has_lost_inertia(before.fit, fit):
-        return NotItself("it takes the place of the inertia")
+        return Instead.INERTIA
     if dataset.channel_delay > 0.0 and effect.delays:
-        return NotItself("the force acts before its time stamp, where it would act after it")
+        return Instead.FORCE_BEFORE_ITS_STAMP
     return None
 
 

@@ -19,6 +19,7 @@ from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.lengths import at_another_length
 from identify.selection.odd_logs import without_odd_log
+from identify.selection.refusal import Refusal
 from identify.selection.roles import RoleDependent, role_dependent, with_exchanged
 from identify.selection.search import Found, Step
 from twin.effects import Catalogue
@@ -41,8 +42,8 @@ class AxisDiagnosis:
     base: the fitted model. ranking: absent effects beside it, proved ones first. steps: every
     change that was accepted on the way. final: the fit with those that are needed at the end.
     findings: what each of these explains. contradicted: findings that the test logs refuse, which
-    the final fit is without. doubted: by name of each law that was taken out at the end, why, in
-    words. unexplained: what the residual depends on, where it is
+    the final fit is without. doubted: by name of each law that was taken out at the end,
+    why. unexplained: what the residual depends on, where it is
     not noise. also_seen: effects that the data show and that take too little to matter. repeat: a
     force that repeats along the track in each log, but at other places in each. depends_on_roles:
     laws that are proved or not by which log chooses.
@@ -56,7 +57,7 @@ class AxisDiagnosis:
     verdict: Verdict
     findings: tuple[Finding, ...] = ()
     contradicted: tuple[Finding, ...] = ()
-    doubted: Mapping[str, str] = field(default_factory=dict)
+    doubted: Mapping[str, Refusal] = field(default_factory=dict)
     unexplained: Dependence | None = None
     also_seen: tuple[str, ...] = ()
     repeat: Repeat | None = None

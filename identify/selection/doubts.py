@@ -25,6 +25,7 @@ from identify.estimation.residual_noise import with_own_noise
 from identify.rules import RULE
 from identify.selection.acceptance import Judged
 from identify.selection.findings import Confirmation, Finding, findings_of, without_law
+from identify.selection.refusal import Instead, Refusal
 from identify.selection.roles import with_turns
 from identify.selection.search import Found, on_final_dataset, resumed, search
 from identify.selection.ties import with_ties
@@ -36,12 +37,12 @@ MOST_REFITS = 5  # of the final model; most models stay where the first ends
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why a law was taken out, in words, and the laws of which changes were found beside it then.
+    """Why a law was taken out, and the laws of which changes were found beside it then.
 
     again: whether it was asked for once more since.
     """
 
-    why: str
+    why: Refusal
     beside: frozenset[str]
     again: bool = False
 
@@ -56,7 +57,7 @@ class Conclusion:
 
     found: Found
     findings: tuple[Finding, ...]
-    doubted: Mapping[str, str] = field(default_factory=dict)
+    doubted: Mapping[str, Refusal] = field(default_factory=dict)
     contradicted: tuple[Finding, ...] = ()
 
 
@@ -143,8 +144,8 @@ def _weakest(ended: Conclusion, found: Found) -> Finding | None:
     return None if any(f.refused for f in rest.findings) else weakest
 
 
-def _why(weakest: Finding) -> str:
-    return weakest.refused or "its band holds the law everywhere"
+def _why(weakest: Finding) -> Refusal:
+    return weakest.refused or Instead.LAW_WITHIN_BAND
 
 
 def _refused(ended: Conclusion, found: Found) -> Conclusion:

@@ -25,10 +25,11 @@ from identify.estimation.evidence import BETTER
 from identify.estimation.fit import Fit, finished, fit_axis, fit_themselves
 from identify.estimation.found_shape import FoundShape, FreeExponent, exponent_curve, found_shape
 from identify.selection.acceptance import Judged, Score, score
-from identify.selection.candidates import NotItself, doubt
+from identify.selection.candidates import doubt
 from identify.selection.changes import Added, Change, Freed, Reshaped
 from identify.selection.of_bodies import is_of_bodies
-from identify.selection.of_friction import IS_FRICTION, is_of_friction
+from identify.selection.of_friction import is_of_friction
+from identify.selection.refusal import Instead, Refusal, is_of_position
 from identify.selection.search import Found, Step, of_simplest_values
 from identify.selection.ties import ALIKE
 from identify.selection.trying import parameters
@@ -124,7 +125,7 @@ class Finding:
     which it is surely more than noise; none where the training logs err more with it too. left,
     left_fitted: over the noise floor, the error that all findings together leave on the logs that
     chose, and on the training logs. doubt: why
-    its values cannot be its own, in words; None where they can. imitated: what its law is on this
+    its values cannot be its own; None where they can. imitated: what its law is on this
     motion, where no more than that is proved. exchanged: part and t of its score with training and
     selection logs exchanged, where it is not proved so; None where it is, or nobody asked.
     """
@@ -144,7 +145,7 @@ class Finding:
     noise: float = 0.0
     left: float = 1.0
     left_fitted: float = 1.0
-    doubt: str | None = None
+    doubt: Refusal | None = None
     imitated: Imitated | None = None
     exchanged: tuple[float, float] | None = None
     parameter_units: dict[str, str] = field(default_factory=dict)
@@ -161,8 +162,8 @@ class Finding:
         return Confirmation.CONTRADICTED if after > self.noise else Confirmation.WITHIN_NOISE
 
     @property
-    def refused(self) -> str | None:
-        """Why it is not proved beside all else that was found, in words; None where it is.
+    def refused(self) -> Refusal | None:
+        """Why it is not proved beside all else that was found; None where it is.
 
         It was chosen of many before; here it is asked alone.
         """
@@ -279,7 +280,7 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
         noise=noise if final.fit.error < less.fit.error else 0.0,
         kind=FindingKind.RESEMBLES if imitated else kind,
         together=tuple(others) if any(s.with_others for s in steps) else (),
-        doubt=doubted.why if doubted and not imitated else None,
+        doubt=None if imitated else doubted,
         imitated=imitated,
     )
     for step in steps:
@@ -287,32 +288,31 @@ def _finding(steps: Sequence[Step], found: Found, noise: float) -> Finding:
     return finding
 
 
-def _imitated(step: Step, doubted: NotItself | None, found: Found) -> Imitated | None:
+def _imitated(step: Step, doubted: Refusal | None, found: Found) -> Imitated | None:
     """What a law is told as where it is not known to be itself; None where that is.
 
     A force of position stands for whatever the force of the place is: another one beside it is more
     of the same.
     """
     if doubted:
-        return doubted.imitated if doubted.is_of_position and step.of_position else None
+        of_position = step.of_position and is_of_position(doubted)
+        return Imitated.OF_POSITION if of_position else None
     beside = any(s.of_position for s in found.steps) and isinstance(step.change, Added)
     return Imitated.OF_POSITION if beside and step.change.effect.is_of_place else None
 
 
-def _of_values(change: Change, less: Judged, final: Judged) -> NotItself | None:
+def _of_values(change: Change, less: Judged, final: Judged) -> Refusal | None:
     """Why the values of a change cannot be its own, as beside a curve that makes its force too."""
     return doubt(less, final.fit, change.effect, parameters(change))
 
 
-def _doubt(change: Change, less: Judged, final: Judged) -> NotItself | None:
+def _doubt(change: Change, less: Judged, final: Judged) -> Refusal | None:
     """The same, and what else of the model explains as much; None where it can be itself."""
     own = _of_values(change, less, final)
     if own is None and is_of_bodies(less, final, change.effect):
-        return NotItself(
-            "another rotor, or bodies with values within a tenth of the file's, explain as much"
-        )
+        return Instead.ROTOR_OR_BODIES
     if own is None and is_of_friction(less, final, change.effect):
-        return IS_FRICTION
+        return Instead.FRICTION_OUT_OF_STEP
     return own
 
 

@@ -17,13 +17,11 @@ from identify.estimation.evidence import effective_samples, rms
 from identify.estimation.force_balance import averaged_force
 from identify.estimation.least_squares import solve, unabsorbed
 from identify.selection.acceptance import Judged, least_t, score
-from identify.selection.candidates import NotItself
 from identify.selection.controls import ControlTest, with_unit_penalty
 from twin.effect import RUBBING, Effect
 from twin.model.machine import AxisModel
 from twin.signals import Array, rate
 
-IS_FRICTION = NotItself("the friction alone, a moment earlier or later, explains as much")
 AS_MUCH = 0.95  # of the part of that law, as two rates are nearly the friction out of step
 SHARED = 0.5  # of how late all of the force seems, that the force without friction is at least
 

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, Score, least_of, least_t, score
+from identify.selection.acceptance import Judged, Score, least_t, proved_in_turn, score
 from identify.selection.changes import control
 from identify.selection.findings import Finding
 from identify.selection.search import Found
-from identify.selection.trying import FEWEST_TURNS, refitted_on
+from identify.selection.trying import refitted_on
 from twin.record import Number, record
 
 
@@ -53,14 +53,11 @@ def with_turns(found: Found, findings: Sequence[Finding]) -> tuple[Finding, ...]
     """
     asked = [f for f in findings if not f.doubt and f.refused]
     finals = _in_turn(found) if asked else []
-    scores = {f.effect: _scores(found, f, finals) for f in asked}
-    proved = {
-        effect: least_of(each)
-        for effect, each in scores.items()
-        if len(each) >= FEWEST_TURNS and all(map(_proved, each))
-    }
+    turns = {f.effect: proved_in_turn(_scores(found, f, finals)) for f in asked}
     return tuple(
-        replace(f, score=replace(f.score, in_turn=proved[f.effect])) if f.effect in proved else f
+        replace(f, score=replace(f.score, in_turn=in_turn))
+        if (in_turn := turns.get(f.effect))
+        else f
         for f in findings
     )
 
@@ -128,13 +125,8 @@ def _gained(found: Found) -> Iterator[RoleDependent]:
             yield RoleDependent(tried.change.name, False, own.part, own.t, own.control)
 
 
-def _proved(there: Score) -> bool:
-    """Whether a law is proved beside all others, where it alone is asked."""
-    return replace(there, among=1).accepted
-
-
 def _surely(there: Score) -> bool:
     """Whether it still is where it is fitted a little otherwise, as another order would fit it."""
     # a t has a spread of one; parts of like logs are often half as much again, and as often less
     clear = there.t >= least_t(1) + 1.0 and there.part >= 1.5 * RULE.least_part
-    return clear and _proved(there)
+    return clear and there.accepted

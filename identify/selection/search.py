@@ -38,7 +38,8 @@ from identify.selection.changes import (
 from identify.selection.controls import ControlTest
 from identify.selection.held import has_collapsed, is_held
 from identify.selection.law_or_curve import NEARLY, follows, laws_for, takes_as_much
-from identify.selection.of_friction import IS_FRICTION, is_of_friction
+from identify.selection.of_friction import is_of_friction
+from identify.selection.refusal import Instead
 from identify.selection.trying import (
     LEADERS,
     Beside,
@@ -390,7 +391,7 @@ def _together(
 
     def is_itself(t: Tried) -> bool:
         # Which friction is out of step is told beside the right one, which may be what is missing.
-        return t.candidate.doubt in (None, IS_FRICTION)
+        return t.candidate.doubt in (None, Instead.FRICTION_OUT_OF_STEP)
 
     def may_help(t: Tried) -> bool:
         score, enough = t.candidate.score, RULE.promise * RULE.least_part
@@ -488,8 +489,7 @@ def _needed(
             if may and not fallen():
                 steps = tuple(replace(s, held=True) if s is step else s for s in steps)
                 continue
-            own = step.tried.candidate.score
-            needed = partial(_is_needed, fit=judged, in_turn=own.in_turn if own else None)
+            needed = partial(_is_needed, fit=judged, in_turn=step.tried.candidate.in_turn)
             is_needed, without = needed(step.change, without), fitted_anew(without)
             if is_needed and needed(step.change, without):
                 continue

@@ -18,7 +18,7 @@ from identify.estimation.residual_noise import foretells_aliases
 from identify.estimation.scaling import Scaling
 from identify.estimation.variable_projection import absent_effects, fit_multistart, starts
 from identify.rules import RULE
-from identify.selection.acceptance import Judged, Score, least_of
+from identify.selection.acceptance import Judged, Score, proved_in_turn
 from identify.selection.ahead import Ahead
 from identify.selection.candidates import Candidate, candidate_of, noise_candidate
 from identify.selection.changes import (
@@ -33,7 +33,8 @@ from identify.selection.changes import (
     reshaped_of,
 )
 from identify.selection.controls import ControlTest
-from identify.selection.of_friction import IS_FRICTION, is_of_friction
+from identify.selection.of_friction import is_of_friction
+from identify.selection.refusal import Instead
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -42,7 +43,6 @@ from twin.parallel import Progress, silent, spread, within
 
 LEADERS = 2  # refitted first, to tell what others must promise; or followed where none helps
 NEARLY_ALL = 0.95  # of what is left: such a change is right wherever the fit's optimum is
-FEWEST_TURNS = 2  # other logs that prove a law: with those that choose most of all logs see it
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +150,10 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
         among = (len(turns) + 1) * score.among if score else 1
         again = judged_change(judged, t.screening, fit, among)
         candidate, name = again.candidate, t.change.name
-        proved = [turn[name] for turn in proofs if name in turn]
-        if candidate.score is None or not FEWEST_TURNS <= len(proved) == len(turns):
+        in_turn = proved_in_turn([turn.get(name) for turn in proofs])
+        if candidate.score is None or in_turn is None:
             return again
-        sure = replace(candidate.score, in_turn=least_of(proved))
+        sure = replace(candidate.score, in_turn=in_turn)
         return replace(again, candidate=replace(candidate, score=sure))
 
     return [as_they_are(t) for t in found.values()]
@@ -161,7 +161,7 @@ def tried_exchanged(judged: Judged, trial: Beside, progress: Progress = silent) 
 
 def may_be_itself(c: Candidate) -> bool:
     """Whether a law is proved but for what only others beside it tell: which one it is."""
-    return c.is_of_position or (c.is_proved and c.doubt == IS_FRICTION)
+    return c.is_of_position or (c.is_proved and c.doubt is Instead.FRICTION_OUT_OF_STEP)
 
 
 def _refitted(
@@ -218,7 +218,7 @@ def judged_change(judged: Judged, screening: Screening, fit: Fit, among: int = 1
         taken = control(change, judged, after)
         found = replace(found, score=replace(found.score, control=taken))
     if found.supported and is_of_friction(judged, after, change.effect):
-        found = replace(found, doubt=IS_FRICTION)
+        found = replace(found, doubt=Instead.FRICTION_OUT_OF_STEP)
     return Tried(change, screening, after, found)
 
 

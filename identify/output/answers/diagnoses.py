@@ -28,6 +28,7 @@ from identify.output.words.diagnosis import (
     said_of,
 )
 from identify.output.words.findings import pairs_in_words
+from identify.output.words.refusal import refusal_in_words
 from identify.results.grown import Addition, AllAdded, Removal
 from identify.results.results import Diagnosis
 from identify.selection.candidates import Candidate
@@ -65,7 +66,7 @@ class AdditionAnswer(Answer, ValuesEntry):
     """Whether the logs prove the effect."""
     part: Number = read("candidate.part")
     """What it takes of the squared error above the noise floor."""
-    why_not: str | None = read("candidate.refused")
+    why_not: str | None
     notes: list[str]
     noise_floor: Number = read("candidate.fit.floor")
     position_error_on: str | None
@@ -79,10 +80,12 @@ class AdditionAnswer(Answer, ValuesEntry):
 @answer_of.register
 def _(result: Addition, **more: Any) -> AdditionAnswer:
     before, after = result.position_error or (None, None)
+    refused = result.candidate.refused
     return AdditionAnswer.of(
         result,
         result.step,
         **_values(result.candidate),
+        why_not=refused and refusal_in_words(refused),
         position_error_before=before,
         position_error_after=after,
         **more,

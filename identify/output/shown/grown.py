@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from identify.output.blocks import Block, Sentence, blocks_of, sentences
 from identify.output.numbers import DisplayUnit, arrow, listed
 from identify.output.words.next_step import errors_of_step, wrong_body_in_words
+from identify.output.words.refusal import refusal_in_words
 from identify.results.grown import Addition, AllAdded, CorrectedBody, Removal
 from twin.model.machine import HistoryStep
 
@@ -27,9 +28,9 @@ def addition_blocks(result: Addition) -> list[Block]:
             f"on {result.position_error_on} (MuJoCo: {scale.text(result.position_error_in_mujoco)})"
         )
     below += result.notes
-    if not result.kept:
+    if (refused := result.candidate.refused) is not None:
         below.append(
-            f"The logs do not prove it: {result.candidate.refused}. The model has it "
+            f"The logs do not prove it: {refusal_in_words(refused)}. The model has it "
             "nevertheless, as asked for; go on with the model before, or, if a diagnosis says that "
             "it needs another beside it, add that to the new model and judge then."
         )

@@ -26,6 +26,7 @@ from identify.output.words.fit import (
     worst_in_words,
 )
 from identify.output.words.next_step import also_chose_in_words, fitted_curves, next_commands
+from identify.output.words.refusal import refusal_in_words
 from identify.output.words.verdict import headline_in_words, verdict_in_words
 from identify.results.results import AxisSummary, Diagnosis
 from identify.rules import RULE
@@ -165,7 +166,7 @@ def not_named_in_words(found: AxisDiagnosis, index: int) -> str | None:
     if leader := _level_with(name, found):
         return f"level with {leader}"
     if name in found.doubted:
-        return f"at the end, {found.doubted[name]}"
+        return f"at the end, {refusal_in_words(found.doubted[name])}"
     for step in found.steps[index:]:
         if name in step.dropped:
             return f"no longer needed beside {model_change_in_words(step.change)}"
@@ -188,7 +189,7 @@ def why_not(found: AxisDiagnosis, candidate: Candidate) -> str:
         return f"proved only together with {other}"
     if leader := _level_with(name, found):
         return f"level with {leader} beside all that was found"
-    return candidate.refused or ""
+    return refusal_in_words(candidate.refused) if candidate.refused else ""
 
 
 # --- notes beside the answer ------------------------------------------------------------------

@@ -16,6 +16,7 @@ from identify.analysis.first_model import first_model
 from identify.mechanism.bodies import possible
 from identify.mechanism.departures import departures_of
 from identify.output.as_json import json_of
+from identify.selection.refusal import Instead
 from identify.selection.trying import try_effect
 from identify.selection.what import What
 from identify.workflow import diagnose, fit
@@ -151,7 +152,7 @@ def test_a_spring_that_turns_as_the_weight_does_is_no_doubt_beside_all_bodies():
     known, spring = found.datasets[joint], CATALOGUE["spring"]
     assert try_effect(found.fits[joint], known, spring).doubt is None
     alone = replace(known, beside_bodies=False)
-    assert "weigh" in try_effect(found.fits[joint], alone, spring).doubt.why
+    assert try_effect(found.fits[joint], alone, spring).doubt is Instead.WEIGHT_OF_BODIES
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from arms import ARM, arm_log, friction
 from identify.analysis.first_model import first_model
 from identify.selection.acceptance import Judged
 from identify.selection.of_bodies import is_of_bodies
+from identify.selection.refusal import Instead
 from identify.selection.trying import effect_tried
 from identify.workflow import fit
 from twin.effects import load_catalogue
@@ -40,4 +41,4 @@ def test_a_law_is_judged_beside_the_bodies(planted, law, of_bodies):
     tried, doubt = found.judged, found.candidate.doubt
     assert tried.fit.error < 0.9 * base.error
     assert is_of_bodies(Judged(base, dataset), tried, CATALOGUE[law]) == of_bodies
-    assert bool(doubt and "weigh" in doubt.why) == of_bodies
+    assert (doubt is Instead.WEIGHT_OF_BODIES) == of_bodies

@@ -31,6 +31,7 @@ from identify.estimation.fit import fit_axis
 from identify.estimation.force_balance import jacobian
 from identify.estimation.least_squares import unabsorbed
 from identify.estimation.variable_projection import tried_shapes
+from identify.output.words.refusal import refusal_in_words
 from identify.selection.acceptance import (
     Judged,
     Score,
@@ -42,6 +43,7 @@ from identify.selection.acceptance import (
     taken,
 )
 from identify.selection.controls import Columns, ControlTest, change_control, with_unit_penalty
+from identify.selection.refusal import ByChance, TakesLittle, Uncertain
 from identify.selection.trying import reshape, try_effect
 from twin.effect import Effect, Excitation, Kind
 from twin.errors import InputError
@@ -77,7 +79,7 @@ def test_a_gain_in_one_block_alone_is_not_sure() -> None:
     found = taken(before, after, FLOOR)
     assert found.whole > 0.9
     assert found.t < 1.5
-    assert "uncertain" in str(Score(found, found).refused)
+    assert Score(found, found).refused == Uncertain(found.t, least_t(1))
 
 
 def test_a_few_large_blocks_do_not_hide_what_all_others_show() -> None:
@@ -95,7 +97,9 @@ def test_a_loss_is_no_gain() -> None:
     found = taken(noise(1.0), noise(1.5), FLOOR)
     assert found.t < -SURE
     assert found.part < 0.0
-    assert str(Score(found, found).refused).startswith("takes 0 %")
+    refused = Score(found, found).refused
+    assert refused == TakesLittle(found.part)
+    assert refusal_in_words(refused) == "takes 0 % of what is left"
 
 
 def test_residuals_that_tell_nothing_of_each_other_are_left_out() -> None:
@@ -149,16 +153,14 @@ def test_the_worse_of_the_two_groups_of_logs_decides(bad: Taken) -> None:
 def test_what_its_controls_take_too_is_no_effect() -> None:
     sure = Taken(9.0, 0.5, 0.5)
     assert Score(sure, sure, control=0.49).accepted
-    assert "shifted in time, where it cannot be real, it takes 55 %" in str(
-        Score(sure, sure, control=0.55).refused
-    )
+    assert Score(sure, sure, control=0.55).refused == ByChance(0.55)
 
 
 def test_of_many_changes_the_best_must_be_surer() -> None:
     """One in twenty of them would be sure by chance."""
     found = Taken(2.0, 0.5, 0.5)
     assert Score(found, found).accepted
-    assert "uncertain" in str(Score(found, found, among=30).refused)
+    assert isinstance(Score(found, found, among=30).refused, Uncertain)
     asked = [least_t(among) for among in (1, 3, 10, 30, 100)]
     assert asked == sorted(asked)
     assert 1.5 < asked[0] < asked[-1] < 4.0

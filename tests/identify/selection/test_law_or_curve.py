@@ -13,6 +13,7 @@ from identify.selection.acceptance import Judged
 from identify.selection.changes import Reshaped
 from identify.selection.findings import findings_of
 from identify.selection.law_or_curve import follows, laws_for
+from identify.selection.refusal import OutsideKnee, Refusal
 from identify.selection.search import Found, Step, search
 from identify.selection.trying import Beside, Tried, effect_tried, tried_beside
 from twin.model.machine import AxisModel
@@ -64,7 +65,7 @@ def test_a_law_that_a_later_curve_makes_is_doubted_where_its_values_became_anoth
     base, dataset = begun(CABLED, {"one": one}, {"two": two})
     stops = effect_tried(base, dataset, law)
 
-    def doubts(**values: float) -> list[str | None]:
+    def doubts(**values: float) -> list[Refusal | None]:
         fit = stops.judged.fit
         there = {**fit.axis["end_stop"].values, **values}
         axis = having(CABLED, "end_stop", **there)
@@ -74,8 +75,8 @@ def test_a_law_that_a_later_curve_makes_is_doubted_where_its_values_became_anoth
 
     assert doubts() == [None]
     (why,) = doubts(low=-0.05, high=0.0)
-    assert why is not None
-    assert "free travel" in why
+    assert isinstance(why, OutsideKnee)
+    assert why.name == "free travel"
 
 
 @pytest.mark.slow  # 8 s

@@ -25,6 +25,7 @@ from identify.output.words.next_step import WRITE, next_commands
 from identify.output.words.verdict import verdict_in_words
 from identify.selection.diagnosis import AxisDiagnosis, Verdict, diagnose_axis
 from identify.selection.findings import Confirmation, Finding, FindingKind
+from identify.selection.refusal import EndsAtBound
 from identify.selection.trying import try_effect
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, MachineModel
@@ -99,9 +100,9 @@ def lagged(tau: float, seed: int) -> Log:
 
 
 @pytest.mark.parametrize(
-    ("tau", "told"), [(0.05, None), (0.15, "actuator_lag.tau ends at a bound")]
+    ("tau", "told"), [(0.05, None), (0.15, EndsAtBound(("actuator_lag.tau",)))]
 )
-def test_a_lag_at_its_upper_bound_is_refused(tau: float, told: str | None) -> None:
+def test_a_lag_at_its_upper_bound_is_refused(tau: float, told: EndsAtBound | None) -> None:
     known = replace(SLIDE, mass_fixed=True)
     fit, dataset = begun(known, {"one": lagged(tau, 1)}, {"held": lagged(tau, 2)})
     assert try_effect(fit, dataset, CATALOGUE["actuator_lag"]).refused == told
@@ -189,7 +190,7 @@ def test_a_friction_that_would_need_more_asymmetry_than_there_is_is_never_named(
     (first, *_) = found.ranking
     assert first.effect.name == "asymmetric_friction"
     assert first.part > 0.9
-    assert "at a bound" in str(first.refused)
+    assert isinstance(first.refused, EndsAtBound)
     assert found.named == ()
 
 
