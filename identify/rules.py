@@ -58,7 +58,7 @@ class DecisionRule:
     """Samples; less is no channel delay."""
 
     most_shift: float = 3.0
-    """Samples; more is a fault of the log that its check finds."""
+    """Samples; more no recorder makes of one, and so has to be most of what is wrong."""
 
     @property
     def fallen(self) -> float:

@@ -26,10 +26,13 @@ from identify.estimation.least_squares import ROUNDING, unabsorbed
 from identify.estimation.residual_dependence import SAME_PERIOD
 from identify.estimation.variable_projection import fit_multistart
 from identify.rules import RULE
+from twin.checks.axis import PHYSICAL
 from twin.effect import Kind
 from twin.model.machine import AxisModel
 from twin.signals import Array
 
+# of the error; by more samples than a recorder makes of one, many a missing effect lags a little
+HALVED = 0.5
 SETTLED = 1e-3  # of a sample, from which on a channel delay is where it stays
 
 
@@ -101,10 +104,11 @@ def misalignment(fit: Fit, dataset: Dataset) -> float:
     a whole is never negative.
     """
     shift, left, after = _linear_shift(fit, dataset)
-    fallen = rms(after) < RULE.fallen * rms(left)
     longest = max(log.motion.sample_period for log in dataset.training)
     samples = (dataset.channel_delay + shift) / longest
-    possible = RULE.least_shift < samples < RULE.most_shift
+    sampled = samples < RULE.most_shift
+    possible = RULE.least_shift < samples and (sampled or samples * longest < PHYSICAL)
+    fallen = rms(after) < (RULE.fallen if sampled else HALVED) * rms(left)
     told = possible and fallen and evidence(left, after, 1).delta_bic > RULE.least_bic
     return shift if told else 0.0
 

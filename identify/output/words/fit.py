@@ -232,7 +232,7 @@ def channel_delay_in_words(dataset: Dataset) -> str | None:
     if abs(samples - 0.5) < 0.15:  # samples, within which a shift of half a sample is told as such
         why = "force and position seem to be read at the same instant"
     return (
-        f"the force acts {1e6 * dataset.channel_delay:.0f} µs ({samples:.2f} samples) before its "
+        f"the force acts {quantity(dataset.channel_delay, 's')} ({samples:.2f} samples) before its "
         f"time stamp, and was moved by as much: {why}"
     )
 

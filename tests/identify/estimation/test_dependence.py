@@ -25,6 +25,7 @@ from identify.estimation.alignment import (
     with_time_origins,
     without_timed_forces,
 )
+from identify.estimation.evidence import rms
 from identify.estimation.fit import Outcome, finished, fit_axis
 from identify.estimation.force_balance import residual
 from identify.estimation.residual_dependence import (
@@ -306,7 +307,16 @@ def test_a_larger_model_moves_the_force_on_or_back():
 
 def test_a_force_that_acts_late_or_hardly_early_is_no_fault_of_the_log():
     axis = AxisModel(1.7)
-    for samples, told in ((0.0, 0), (-1.0, 0), (0.042, 0), (0.058, 1), (2.7, 1), (3.6, 0)):
+    for samples, told in (
+        (0.0, 0),
+        (-1.0, 0),
+        (0.042, 0),
+        (0.058, 1),
+        (2.7, 1),
+        (3.6, 1),
+        (6.0, 1),
+        (11.0, 0),
+    ):
         log = aligned(samples, noise=1e-4)
         found = misalignment(fit_of(axis, log), dataset_of(log))
         assert (found > 0.0) == bool(told), samples
@@ -314,11 +324,31 @@ def test_a_force_that_acts_late_or_hardly_early_is_no_fault_of_the_log():
     assert misalignment(fit_of(axis, log), dataset_of(log)) == 0.0
 
 
+@pytest.mark.parametrize(("part", "told"), [(0.2, True), (0.8, False)])
+def test_a_delay_that_no_recorder_makes_of_a_sample_is_most_of_what_is_wrong(part, told):
+    """Another effect of as much force may lag by a little of that; 3 samples are the recorder's."""
+    log, axis = aligned(5.0, noise=1e-4), AxisModel(MASS)
+    left = fit_of(axis, log)
+    rest = np.random.default_rng(3).standard_normal(len(left.residual))
+    other = part / (1.0 - part) * rms(left.residual) * rest
+    both = replace(left, residual=left.residual + other)
+    assert (misalignment(both, dataset_of(log)) > 0.0) == told
+
+
+def test_a_recorder_that_reads_the_force_cycles_late_leaves_nothing_else_to_find():
+    """A sound drive left 47 times its floor, and nothing was said of it."""
+    late = dataset_of(aligned(4.0), holdout=(aligned(4.0, 6),))
+    found, fit = fit_aligned(AxisModel(1.5), late)
+    assert found.channel_delay == pytest.approx(4e-3, rel=0.01)
+    assert fit.axis.mass == pytest.approx(MASS, rel=3e-3)
+    assert fit.error < 0.03 * fit_axis(AxisModel(1.5), late.training).error
+
+
 def test_a_shift_is_said_in_samples():
     log = aligned(0.0)
     assert channel_delay_in_words(dataset_of(log)) is None
     said = channel_delay_in_words(dataset_of(log, channel_delay=1.5e-3))
-    assert said.startswith("the force acts 1500 µs (1.50 samples) before")
+    assert said.startswith("the force acts 1.50 ms (1.50 samples) before")
     half = channel_delay_in_words(dataset_of(log, channel_delay=0.53 * log.motion.sample_period))
     assert "(0.53 samples)" in half
     assert "read at the same instant" in half
