@@ -107,19 +107,24 @@ def _carried(arm: Arm, joint: int) -> float:
 
 
 def answers_of(found: Diagnosis) -> list[tuple[tuple[Told, ...], float, str]]:
-    """Each answer with those tied with it, how sure it is stated, and its values in words."""
+    """Each answer with those tied with it, how sure it is stated, and its values in words.
+
+    Of several that are tied with it together, each counts.
+    """
     out = list[tuple[tuple[Told, ...], float, str]]()
     if found.recording is not None:
         what = "weight" if "weight" in found.recording.said else found.recording.axis
         out.append((((RECORDED, what),), 1.0, found.recording.said))
     for body in found.bodies:
-        names = tuple(_placed(name, BODY) for name in (body.body, *body.tied))
+        each = (name.split(" with ") for name in (body.body, *body.tied))
+        names = tuple(_placed(name, BODY) for together in each for name in together)
         mass, band = body.change[0], body.band[0]
         out.append((names, body.confidence, f"{mass:.3f} ± {band:.3f} kg"))
     for axis, own in found.axes.items():
         for f in own.findings:
             values = ", ".join(f"{k} {v:.3g}" for k, v in f.parameters.items())
-            names = tuple(_placed(name, "", axis) for name in (f.effect, *f.tied))
+            each = (name.split(" with ") for name in (f.effect, *f.tied))
+            names = tuple(_placed(name, "", axis) for together in each for name in together)
             out.append((names, f.confidence or 0.0, values))
     return out
 

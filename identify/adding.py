@@ -203,7 +203,8 @@ def correct_body(
             f"{model.mjcf_name}: the logs prove no body to correct it; `twin diagnose` says what "
             "they show"
         )
-    bodies = found.bodies_beside(found.fits, found.datasets)
+    found = found.beside(found.fits, found.datasets)
+    bodies = tuple(body.told_beside(found.fits, found.datasets) for body in found.bodies)
     made = corrected(before.model, bodies, found.fits, file)
     return CorrectedBody(made, before.model, bodies)
 

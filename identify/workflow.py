@@ -292,8 +292,12 @@ def diagnose(
     axes = dict(zip(away.fits, spread(partial(diagnosed, away), away.fits), strict=True))
     away, anew = away.asked_again(axes, progress)
     axes |= zip(anew, spread(partial(diagnosed, away), anew), strict=True)
-    ends = {axis: d.final for axis, d in axes.items()}
-    bodies = away.bodies_beside(ends, {axis: d.dataset for axis, d in axes.items()})
+    away = away.beside(
+        {a: d.final for a, d in axes.items()}, {a: d.dataset for a, d in axes.items()}
+    )
+    axes = {a: d.beside(away.fits[a], away.datasets[a]) for a, d in axes.items()}
+    bases = {a: d.base for a, d in axes.items()}
+    bodies = tuple(body.told_beside(bases, away.datasets) for body in away.bodies)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     model = _begun(result.model, axes, summaries)

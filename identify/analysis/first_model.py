@@ -23,7 +23,6 @@ from twin.effect import LEAST, MOST, Effect, Excitation, Kind
 from twin.effects import Catalogue
 from twin.errors import InputError
 from twin.logs import Log
-from twin.model.file import storable
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.model.units import AxisUnits
 
@@ -265,7 +264,7 @@ def _of_constant_force(motions: Sequence[Motion]) -> str:
 
 
 def _hardware(motions: Sequence[Motion], covered: Excitation, force_constant: float) -> Hardware:
-    """What the logs show of it, less what no model's file may hold; force_constant: N/A."""
+    """What the logs show of it, less what no hardware may be; force_constant: N/A."""
     test_function = 0.02  # s, over which the acceleration that was reached is averaged
     reached = max(
         float(np.abs(TestFunction.at_least(test_function, m.period).acceleration(m.velocity)).max())
@@ -273,20 +272,18 @@ def _hardware(motions: Sequence[Motion], covered: Excitation, force_constant: fl
     )
     margin = 0.05 * covered.travel  # of the way that was covered, beyond its ends
     digits = 2 - floor(log10(covered.travel))  # of a hundredth of the way, wherever it lies
-    return storable(
-        Hardware(
-            travel=(
-                round(covered.position_low - margin, digits),
-                round(covered.position_high + margin, digits),
-            ),
-            force_constant=force_constant,
-            force_limit=_shown(2.0 * covered.force_max),
-            encoder_resolution=_shown(covered.resolution),
-            encoder_noise=_shown(max(m.position_noise for m in motions)),
-            velocity=_shown(covered.speed_max),
-            acceleration=_shown(reached),
-            jerk=_shown(reached / test_function),
-        )
+    return Hardware.of_allowed(
+        travel=(
+            round(covered.position_low - margin, digits),
+            round(covered.position_high + margin, digits),
+        ),
+        force_constant=force_constant,
+        force_limit=_shown(2.0 * covered.force_max),
+        encoder_resolution=_shown(covered.resolution),
+        encoder_noise=_shown(max(m.position_noise for m in motions)),
+        velocity=_shown(covered.speed_max),
+        acceleration=_shown(reached),
+        jerk=_shown(reached / test_function),
     )
 
 

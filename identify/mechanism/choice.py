@@ -30,12 +30,12 @@ MOST = 6  # groups that may move
 class Moved:
     """A group that must move away from the file.
 
-    tied: others that explain as much in its place. values (k,): its change. score: over all joints,
-    beside all else that moved.
+    tied: what explains as much in its place, another group or several of them together. values
+    (k,): its change. score: over all joints, beside all else that moved.
     """
 
     group: Group
-    tied: tuple[Group, ...]
+    tied: tuple[tuple[Group, ...], ...]
     values: Array
     score: Score
 
@@ -166,21 +166,21 @@ class Choice:
         found = self.solution(chosen)
         score = self._with_control(g, chosen)
         others = self.regression.groups
-        tied = tuple(others[r] for r in self._in_its_place(g, chosen))
+        tied = tuple(tuple(others[r] for r in rivals) for rivals in self._in_its_place(g, chosen))
         return Moved(others[g], tied, found.values[self.regression.spans[g]], score)
 
-    def _in_its_place(self, g: int, chosen: Chosen) -> list[int]:
-        """The groups that explain as much in the place of one, in the best sets without it.
+    def _in_its_place(self, g: int, chosen: Chosen) -> list[list[int]]:
+        """What explains as much in the place of one group, of the best sets without it.
 
         Without it and those found already, as each may hide another that does as well.
         """
-        barred, found = frozenset({g}), list[int]()
+        barred, found = frozenset({g}), list[list[int]]()
         while True:
             other = self._needed(self._grown(barred))
             new = sorted(other - chosen)
             if not new or not self._level(other, chosen):
                 return found
-            barred, found = barred | {*new}, [*found, *new]
+            barred, found = barred | {*new}, [*found, new]
 
     def _level(self, other: Chosen, chosen: Chosen) -> bool:
         """Whether a set explains as much as a better one, or leaves no part more that matters."""

@@ -70,7 +70,7 @@ class Departures:
 
         def tied(name: str) -> list[str]:
             alike = (m.tied for m in own if name in laws and m.group.what.covers(laws[name]))
-            return [self.named(group) for groups in alike for group in groups]
+            return [self.named(together) for rivals in alike for together in rivals]
 
         findings = tuple(
             replace(f, tied=tuple(dict.fromkeys((*f.tied, *tied(f.effect)))))
@@ -78,29 +78,35 @@ class Departures:
         )
         return replace(found, findings=findings)
 
-    def bodies_beside(
-        self, fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]
-    ) -> tuple[WrongBody, ...]:
+    def beside(self, fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]) -> Departures:
         """The bodies once more, beside all that was found of the joints since: their fits now.
 
         What a joint lacked had been a part of their values, and no part of their bands. What it may
-        lack still is as likely to move them as far: so far they moved is within the bands.
+        lack still is as likely to move them as far: so far they moved is within the bands. Joints
+        are fitted again beside the bodies that are told; where these explain less, both stay.
         """
+        now = replace(self, fits=fits, datasets=datasets)
         if not self.bodies:
-            return ()
+            return now
         gains = [g for g in self.groups if g.what is What.GAIN]
         moved = self._corrected
         told = _Estimated.of(
             _regression(_all_on_beginnings(fits, datasets), [*moved, *gains]), moved
         )
-        return tuple(
+        bodies = tuple(
             replace(
-                body, change=body.change + told.changes[body.body],
-                band=np.hypot(told.bands[body.body], told.changes[body.body]),
+                body, band=np.hypot(told.bands[body.body], told.changes[body.body]),
                 disagreeing=told.disagreeing[body.body],
             )
             for body in self.bodies
         )  # fmt: skip
+        own = {g.place: g.body for g in moved if g.body is not None}
+        others = _with_changed(datasets, [(own[n], more) for n, more in told.changes.items()])
+        again = {a: _refitted(fits[a], dataset) for a, dataset in others.items()}
+        if sum(f.ratio**2 for f in again.values()) > sum(f.ratio**2 for f in fits.values()):
+            return replace(now, bodies=bodies)
+        changed = (replace(b, change=b.change + told.changes[b.body]) for b in bodies)
+        return replace(now, fits=again, datasets=others, bodies=tuple(changed))
 
     def asked_again(
         self, axes: Mapping[str, AxisDiagnosis], progress: Progress = silent
@@ -150,9 +156,13 @@ class Departures:
             if g.what is What.BODY or not has_it(g)
         ]
 
-    def named(self, group: Group) -> str:
-        """E.g. "rotor_inertia of elbow", "link_mass of fore"."""
-        return f"{self.names[group.what]} of {group.place}"
+    def named(self, together: Sequence[Group], *, beside_body: bool = False) -> str:
+        """E.g. "rotor_inertia of elbow with link_mass of fore"; beside a body, one is "fore"."""
+        each = (
+            g.place if beside_body and g.body else f"{self.names[g.what]} of {g.place}"
+            for g in together
+        )
+        return " with ".join(each)
 
 
 def departures_of(
@@ -226,11 +236,8 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
     if not own:
         return found
     told = _Estimated.of(regression, [m.group for m in found.moved])
-    datasets = dict(found.datasets)
-    for m in own:
-        assert m.group.body is not None
-        change = told.changes[m.group.place]
-        datasets = {a: m.group.body.corrected(d, change) for a, d in datasets.items()}
+    changes = [(m.group.body, told.changes[m.group.place]) for m in own if m.group.body]
+    datasets = _with_changed(found.datasets, changes)
     # A wrong body hides by how much the channels of a log are apart.
     again = {a: fit_aligned(found.fits[a].axis, d) for a, d in datasets.items()}
     datasets = {a: dataset for a, (dataset, _) in again.items()}
@@ -238,6 +245,15 @@ def _with_bodies(found: Departures, regression: Regression) -> Departures:
     errors = {a: _errors(found.fits[a], found.datasets[a], fits[a], datasets[a]) for a in fits}
     bodies = tuple(_wrong_body(found, m, told, errors) for m in own)
     return replace(found, datasets=datasets, fits=fits, bodies=bodies)
+
+
+def _with_changed(
+    datasets: Mapping[str, Dataset], changes: Sequence[tuple[Body, Array]]
+) -> dict[str, Dataset]:
+    """The datasets of joints with bodies changed by so much (10,)."""
+    for body, change in changes:
+        datasets = {axis: body.corrected(own, change) for axis, own in datasets.items()}
+    return dict(datasets)
 
 
 def _wrong_body(
@@ -248,7 +264,7 @@ def _wrong_body(
     return WrongBody(
         body=name,
         axis=body.axis,
-        tied=tuple(g.place if g.body else found.named(g) for g in moved.tied),
+        tied=tuple(found.named(together, beside_body=True) for together in moved.tied),
         axes=tuple(axis for axis in body.axes if axis in errors),
         inertial=body.inertial,
         change=told.changes[name],

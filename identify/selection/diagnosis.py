@@ -10,9 +10,10 @@ from functools import cached_property
 from identify.dataset.dataset import Dataset
 from identify.dataset.time_scale import TEST_FUNCTIONS
 from identify.estimation.errors import Errors
-from identify.estimation.fit import Fit, finished
+from identify.estimation.fit import Fit, finished, fit_axis
 from identify.estimation.residual_dependence import Dependence, Repeat, find_dependence, not_general
 from identify.rules import RULE
+from identify.selection.acceptance import Judged
 from identify.selection.candidates import Candidate
 from identify.selection.changes import Added, control
 from identify.selection.doubts import Conclusion, concluded
@@ -91,6 +92,36 @@ class AxisDiagnosis:
     def chosen(self) -> Errors:
         """The same errors on the logs that chose."""
         return Errors.of(self.base, self.final, self.dataset, self.dataset.chosen_on)
+
+    def beside(self, final: Fit, dataset: Dataset) -> AxisDiagnosis:
+        """The diagnosis with its fits made again on a dataset whose bodies are others by now.
+
+        What was found stays; its values and errors, and what is left, are told anew. Beside others
+        the error without a finding is what it was: as much of it is theirs now as before.
+        """
+        if dataset is self.dataset:
+            return self
+        base = replace(fit_axis(self.base.axis, dataset.training), begun=self.base.begun)
+        final = base if self.final is self.base else final
+        quiet = final.at_floor or Judged(final, dataset).other_at_floor
+
+        def anew(errors: Errors) -> Errors:
+            now = Errors.of(base, final, dataset, errors.on)
+            return now if not self.findings[1:] else replace(errors, after=now.after)
+
+        def values(f: Finding) -> dict[str, float]:
+            there = f.effect in final.axis.names
+            return dict(final.axis[f.effect].values) if there else f.parameters
+
+        findings = tuple(
+            replace(f, tested=anew(f.tested), chosen=anew(f.chosen), parameters=values(f))
+            for f in self.findings
+        )
+        return replace(
+            self, dataset=dataset, base=base, final=final, findings=findings,
+            verdict=_verdict(findings, quiet), repeat=None if quiet else self.repeat,
+            unexplained=None if quiet else find_dependence(final, dataset),
+        )  # fmt: skip
 
     @property
     def explained(self) -> float:

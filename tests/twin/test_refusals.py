@@ -37,8 +37,6 @@ def holding(**columns: object) -> Log:
         (replace(LOG, axes={"x y": ONE}), "axis name 'x y': use letters, digits and underscores"),
         (replace(LOG, metadata={"run": 3}), "metadata run is 3; metadata values are text"),
         (holding(heat=np.zeros(4)), "unknown signal heat; allowed: "),
-        (holding(velocity=np.zeros(3)), "velocity has shape (3,), expected (4,): one value a"),
-        (holding(velocity=np.array(["a"] * 4)), "velocity holds <U1 values; give real numbers"),
         (holding(velocity=np.array([0, 1, math.nan, 0])), "velocity is nan at 0.002 s (sample 2)"),
         (replace(LOG, truth={"x": {"a b": np.zeros(4)}}), "column name 'a b': use letters, digits"),
     ],
@@ -48,6 +46,39 @@ def test_what_no_log_can_hold_is_not_written(log, said, tmp_path):
         write_log(log, tmp_path / "a.mcap")
     assert said in str(error.value)
     assert not list(tmp_path.iterdir())
+
+
+MM, MIXED = {"position": "mm"}, {"position": "m", "force": "N m"}
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: holding(velocity=np.zeros(3)), "the columns differ in length (position 4, force"),
+        (lambda: holding(velocity=np.array(["1"] * 4)), "velocity is no column of numbers (['1'"),
+        (lambda: holding(velocity=np.zeros((4, 1))), "velocity is no column of numbers"),
+        (lambda: holding(velocity=[1.0, None, [2.0], 3.0]), "velocity is no column of numbers"),
+        (lambda: replace(ONE, units=MM), "unit of position is 'mm', allowed is m or rad"),
+        (lambda: replace(ONE, units=MIXED), "force in N m, position in m: units of a rotary"),
+        (lambda: replace(LOG, sample_rate=0.0), "sample_rate is 0.0 Hz; give a number above 0"),
+        (
+            lambda: replace(LOG, axes={"x": ONE, "y": AxisLog({"position": np.zeros(3)})}),
+            "the axes differ in length (x 4, y 3 samples); record all with one clock",
+        ),
+    ],
+)
+def test_what_is_no_log_is_refused_where_it_is_made(made, said):
+    """A fit took a position in "mm" for one in m, and columns of two lengths ended in NumPy."""
+    with pytest.raises(InputError) as error:
+        made()
+    assert str(error.value).startswith(said)
+
+
+@pytest.mark.parametrize("column", [[0, 1, 2], (0.0, 1.0, 2.0), np.arange(3, dtype=np.float32)])
+def test_columns_of_any_numbers_are_those_of_a_log(column):
+    kept = AxisLog({"position": column}).position
+    assert kept.dtype == np.float64
+    np.testing.assert_array_equal(kept, [0.0, 1.0, 2.0])
 
 
 @pytest.mark.parametrize(

@@ -78,11 +78,6 @@ def _missing(axis: Axis) -> Iterator[LogFinding]:
         what = "there is no force, nor a current with a force constant"
         remedy = f"add the command, or force_constant ({axis.log.kind('N/A')}) to the axis"
         yield axis.error(Fault.INCOMPLETE, what, remedy)
-    lengths = {name: len(column) for name, column in columns.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        what = f"the columns differ in length ({told})"
-        yield axis.error(Fault.INCOMPLETE, what, "record all with one clock")
 
 
 def assumptions(map_text: str, axis: str) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from twin.errors import InputError
 from twin.model.units import AxisUnits, rotary_unit, units_of
@@ -39,11 +39,20 @@ class AxisLog:
     units: field name -> unit text; force_constant: N/A (N m/A on a rotary axis) or None.
     Sample k of ``position`` is the reading at t_k; sample k of ``force``/``current`` is the
     command held over [t_k, t_k + dt).
+
+    Raises InputError for columns of different length or that are no numbers, and for units that
+    are not SI or not all of a linear, or of a rotary, axis.
     """
 
     columns: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=lambda: LINEAR_UNITS)
     force_constant: float | None = None
+
+    def __post_init__(self) -> None:
+        columns = {name: _column(name, column) for name, column in self.columns.items()}
+        _require_one_length({name: len(column) for name, column in columns.items()}, "columns")
+        object.__setattr__(self, "columns", columns)
+        complete_units({n: u for n, u in self.units.items() if n in FIELDS})
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -79,12 +88,56 @@ class AxisLog:
         return self.force_constant * self.columns["current"]
 
 
+def _column(name: str, given: ArrayLike) -> Array:
+    """Samples (n,) as numbers, of an array, a list or a column of another library."""
+    try:
+        column = np.asarray(given)
+        column = column if column.dtype.kind in "USMm" else column.astype(float, copy=False)
+    except (TypeError, ValueError):
+        column = np.empty((0, 0))
+    if column.ndim != 1 or column.dtype != np.float64:
+        shown = " ".join(f"{given!s:.60}".split())
+        raise InputError(f"{name} is no column of numbers ({shown}); give one number a sample")
+    return column
+
+
+def _require_one_length(lengths: Mapping[str, int], of: str) -> None:
+    """Raise InputError where there are several."""
+    if len({*lengths.values()}) > 1:
+        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise InputError(f"the {of} differ in length ({told} samples); record all with one clock")
+
+
+def complete_units(stated: Mapping[str, str]) -> dict[str, str]:
+    """Units of all fields from those stated.
+
+    Raises InputError for one that is not SI, and for those of two kinds of axis.
+    """
+    for name, unit in stated.items():
+        if unit not in (LINEAR_UNITS[name], ROTARY_UNITS[name]):
+            allowed = " or ".join(dict.fromkeys((LINEAR_UNITS[name], ROTARY_UNITS[name])))
+            raise InputError(
+                f"unit of {name} is {unit!r}, allowed is {allowed}; convert it with: twin import"
+            )
+    turning = {n: u for n, u in stated.items() if u != LINEAR_UNITS[n]}
+    linear = {n: u for n, u in stated.items() if u != ROTARY_UNITS[n]}
+    if turning and linear:
+        told = ", ".join(f"{name} in {unit}" for name, unit in {**turning, **linear}.items())
+        raise InputError(
+            f"{told}: units of a rotary and of a linear axis together; convert all to one kind "
+            "with: twin import"
+        )
+    return {**(ROTARY_UNITS if turning else LINEAR_UNITS), **stated}
+
+
 @dataclass(frozen=True)
 class Log:
     """One log: ``axes`` by name ("x", "y"), sampled at ``sample_rate`` (Hz) from t = 0.
 
     truth: axis -> column name -> (n,) array, simulation only; identification never reads it.
     metadata: the MCAP metadata record "twin"; attachments: file name -> bytes.
+
+    Raises InputError for a rate that is no number above 0, and for axes of different length.
     """
 
     sample_rate: float
@@ -92,6 +145,11 @@ class Log:
     metadata: Mapping[str, str] = field(default_factory=dict)
     truth: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     attachments: Mapping[str, bytes] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.sample_rate < np.inf:
+            raise InputError(f"sample_rate is {self.sample_rate} Hz; give a number above 0")
+        _require_one_length({name: len(axis) for name, axis in self.axes.items()}, "axes")
 
     def __len__(self) -> int:
         return len(next(iter(self.axes.values()), ()))

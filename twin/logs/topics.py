@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError, at
 from twin.logs.container import RECORD_HEAD, Damaged, parse, record_at
-from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
+from twin.logs.log import FIELDS, Array, complete_units
 from twin.numbers import first_not_finite
 
 AXIS_SAMPLE = "twin.AxisSample"
@@ -240,18 +240,6 @@ class Topic:
 def axis_of(topic: str) -> str:
     """Name of the axis of a topic of samples."""
     return topic.rpartition("/")[2]
-
-
-def complete_units(stated: Mapping[str, str]) -> dict[str, str]:
-    """Units of all fields from those stated; raises InputError for one that is not SI."""
-    for name, unit in stated.items():
-        if unit not in (LINEAR_UNITS[name], ROTARY_UNITS[name]):
-            allowed = " or ".join(dict.fromkeys((LINEAR_UNITS[name], ROTARY_UNITS[name])))
-            raise InputError(
-                f"unit of {name} is {unit!r}, allowed is {allowed}; convert it with: twin import"
-            )
-    rotary = any(unit != LINEAR_UNITS[name] for name, unit in stated.items())
-    return {**(ROTARY_UNITS if rotary else LINEAR_UNITS), **stated}
 
 
 def positive_number(metadata: Mapping[str, str], key: str) -> float | None:

@@ -26,7 +26,7 @@ from twin.errors import InputError, at
 from twin.files import atomic_writer, recording
 from twin.logs.container import MAGIC
 from twin.logs.decode import CHECKSUM, METADATA_NAME, SCHEMA_VERSION, checksum
-from twin.logs.log import Array, AxisLog, Log, in_multiples
+from twin.logs.log import Array, AxisLog, Log, complete_units, in_multiples
 from twin.logs.topics import (
     AXIS_PREFIX,
     AXIS_SAMPLE,
@@ -35,7 +35,6 @@ from twin.logs.topics import (
     IDENTIFIER,
     TRUTH_PREFIX,
     MessageLayout,
-    complete_units,
     file_descriptor_set,
     numbered,
     sample_times,
@@ -111,8 +110,6 @@ def outline_of(log: Log) -> Outline:
     """The file of a log; raises InputError for one that could not be read back."""
     if not log.axes or len(log) == 0:
         raise InputError("the log has no samples; record or import at least one")
-    if not 0.0 < log.sample_rate < math.inf:
-        raise InputError(f"sample rate is {log.sample_rate} Hz; give a number above 0")
     for name in (*log.axes, *log.truth):
         if not IDENTIFIER.fullmatch(name):
             raise InputError(f"axis name {name!r}: use letters, digits and underscores, as in x")

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tomlkit
-from pydantic import ValidationError
 
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
@@ -275,18 +274,6 @@ def save_model(model: MachineModel, path: str | Path) -> None:
                 "another folder"
             )
     write_atomically(path, text.encode())
-
-
-def storable(hardware: Hardware) -> Hardware:
-    """The hardware less what no model's file may hold, which has its default."""
-    given = {key: getattr(hardware, key) for key in Hardware.entries()}
-    try:
-        AxisEntry.model_validate({name: v for name, v in given.items() if v is not None})
-    except ValidationError as errors:
-        wrong = {str(error["loc"][0]) for error in errors.errors()}
-        defaults = Hardware()
-        return replace(hardware, **{name: getattr(defaults, name) for name in wrong})
-    return hardware
 
 
 ENTRY = "intervals"  # of the TOML document

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from typing import Any
@@ -83,11 +84,24 @@ def _of_hardware(default: Any, *args: Any, **kwargs: Any) -> Any:
     return field(default=default, metadata={"entry": HardwareEntry(*args, **kwargs)})
 
 
+def require_number(
+    name: str, value: float, unit: str, *, zero: bool = False, most: float = math.inf
+) -> None:
+    """Raise InputError for what is no number above 0 (``zero``: or 0), and no larger than most."""
+    fine = is_number(value) or value == math.inf
+    if fine and (value > 0.0 or (zero and value == 0.0)) and value <= most:
+        return
+    least = "a number from 0" if zero else "a number above 0"
+    limit = "" if most == math.inf else f", at most {most:g}"
+    raise InputError(f"{name} = {value!s:.60} {unit}: give {least}{limit}")
+
+
 @dataclass(frozen=True)
 class Hardware:
     """What surrounds an axis' mechanics, in the units of a linear axis (see twin.model.units).
 
-    A field is declared here alone: files, their schema and their comments follow.
+    A field is declared here alone: files, their schema and their comments follow. Raises InputError
+    for a value that its entry does not allow.
     """
 
     travel: tuple[float, float] | None = _of_hardware(None, "m", "low and high end")
@@ -104,6 +118,35 @@ class Hardware:
     acceleration: float = _of_hardware(2.0, "m/s^2", "fastest move", ", fastest move")
     jerk: float = _of_hardware(200.0, "m/s^3", "fastest move", ", fastest move")
     bandwidth: float = _of_hardware(30.0, "Hz", "of the position loop", ", position loop", most=1e6)
+
+    def __post_init__(self) -> None:
+        for name in self.entries():
+            self._require(name, getattr(self, name))
+
+    @classmethod
+    def of_allowed(cls, **values: Any) -> Hardware:
+        """Hardware with those of the values that it may have, and else with its defaults."""
+        allowed = {}
+        for name, value in values.items():
+            with suppress(InputError):
+                cls._require(name, value)
+                allowed[name] = value
+        return cls(**allowed)
+
+    @classmethod
+    def _require(cls, name: str, value: Any) -> None:
+        """Raise InputError for a value that its entry does not allow."""
+        entry = cls.entries()[name]
+        if name != "travel":
+            require_number(name, value, entry.unit, zero=entry.zero, most=entry.most)
+        elif value is not None:
+            low, high = value
+            farthest = 1e6  # m, beyond which a position is one in counts
+            if not (is_number(low) and is_number(high) and -farthest <= low < high <= farthest):
+                raise InputError(
+                    f"travel = [{low}, {high}] m: give its low and its high end, the low one "
+                    f"first, at most {farthest:g}"
+                )
 
     @classmethod
     def entries(cls) -> dict[str, HardwareEntry]:
@@ -187,7 +230,8 @@ class Hindrance(Enum):
 class AxisModel:
     """One axis of a machine: what is moved, what surrounds it, and its effects.
 
-    Raises InputError for a mass below zero, two frictions, and an effect that the axis cannot have.
+    Raises InputError for a mass below zero, a time that is no number above zero, two frictions, and
+    an effect that the axis cannot have.
     """
 
     mass: float
@@ -214,11 +258,14 @@ class AxisModel:
 
     def __post_init__(self) -> None:
         name, unit = self.units.mass_name, self.units.mass
-        if not (math.isfinite(self.mass) and self.mass >= 0):
+        if not (is_number(self.mass) and self.mass >= 0):
             raise InputError(
                 f"{name} = {self.mass} {unit}: must be a positive number of {unit}, or 0 where the "
                 "motion is imposed"
             )
+        if self.test_function is not None:
+            require_number("test_function", self.test_function, "s", most=1e3)
+        require_number("channel_delay", self.channel_delay, "s", zero=True, most=1.0)
         frictions = [f.effect.name for f in self.effects if f.effect.kind is Kind.FRICTION]
         if len(frictions) > 1:
             raise InputError(
@@ -341,7 +388,8 @@ class AxisModel:
 class MachineModel:
     """A machine: its axes, how it is sampled, and how the model grew.
 
-    Raises InputError where it has more than two axes and an effect that depends on the other one.
+    Raises InputError where it has more than two axes and an effect that depends on the other one,
+    and for a rate that is no number above 0.
     """
 
     name: str
@@ -360,6 +408,7 @@ class MachineModel:
     """By axis, what its last fit found; none where the axis was exchanged since."""
 
     def __post_init__(self) -> None:
+        require_number("sample_rate", self.sample_rate, "Hz", most=1e7)
         for name, axis in self.axes.items():
             for f in axis.effects:
                 self.require_usable(f.effect, name)

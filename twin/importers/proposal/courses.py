@@ -206,14 +206,14 @@ def follows(
 
 
 def answer(force: TableColumn, reading: TableColumn) -> float:
-    """The largest correlation of the noise of a column with that of a force, up to 3 rows later.
+    """The largest correlation of the noise of a column with that of a force, up to 7 rows later.
 
     0 where there is no noise to answer.
     """
     if not reading.rough(1)[1]:
         return 0.0
     a, b = (np.diff(c.smooth[reading.lively], 4) for c in (reading, force))
-    found = [likeness(a[: len(a) - k], b[k:]) for k in range(4)]
+    found = [likeness(a[: len(a) - k], b[k:]) for k in range(8)]  # rows, as a bus has it late
     return max(found, key=abs)
 
 
