@@ -32,7 +32,6 @@ from identify.experiment_design.plan import next_experiments
 from identify.experiment_design.plan import plan as plan
 from identify.frequency.of_logs import responses_of
 from identify.mechanism.departures import Departures, departures_of
-from identify.output.printing import to_text as to_text  # results print themselves
 from identify.results.frequency import FrequencyResponse
 from identify.results.results import (
     AxisSummary,
@@ -60,7 +59,7 @@ from identify.validation.tracking import tracking, unmoved
 from twin.effect import Effect
 from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
-from twin.logs import GivenLogs, Log, logs_by_name
+from twin.logs import GivenLogs, Log, logs_by_name, some_logs
 from twin.model.file import as_model
 from twin.model.machine import AxisModel, MachineModel
 from twin.parallel import Progress, parallel, silent, spread, within
@@ -186,12 +185,16 @@ def fit_simulation(found: FitResult, *, progress: Progress = silent) -> Simulati
 
 @parallel()
 def compare(
-    model: Model, logs: GivenLogs, *, test_function: float | None = None,
+    model: Model,
+    logs: GivenLogs,
+    *,
+    catalogue: Catalogue | None = None,
+    test_function: float | None = None,
     progress: Progress = silent,
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """The errors of a model with its present values, and where it fails. Raises InputError."""
     progress(READING, 0, 1)
-    given = as_given(model, logs)
+    given = as_given(model, logs, catalogue=catalogue)
     model, axes = given.model, given.model.axes
     found = {
         axis: telling(dataset, sticks(axes[axis]))
@@ -225,8 +228,8 @@ def as_given(
     catalogue: Catalogue | None = None,
 ) -> Given:
     """A model and its logs, of whatever the caller has. Raises InputError."""
-    roles = (Role.TRAINING, logs), (Role.SELECTION, holdout), (Role.TEST, test)
-    parts = [logs_by_name(given, role.value) for role, given in roles]
+    others = [logs_by_name(g, r.value) for r, g in ((Role.SELECTION, holdout), (Role.TEST, test))]
+    parts = [some_logs(logs, Role.TRAINING.value), *others]
     machine = as_model(model, catalogue)
     recording = _recording_of(machine, parts[0])
     training, selection, tests = (_read_as(recording, part) for part in parts)
@@ -393,7 +396,7 @@ def frequency_response(
     is simulated on the setpoints of the logs, and its response estimated in the same way. Raises
     InputError where no axis moves in all of the logs, or their sample rates differ.
     """
-    given = dict(logs_by_name(logs))  # each is read once
+    given = dict(some_logs(logs))  # each is read once
     machine = None if model is None else as_model(model, catalogue)
     kept = informative_logs(given, {name: shortness(log) for name, log in given.items()})
     return FrequencyResponse(tuple(kept), responses_of(kept, machine, progress))

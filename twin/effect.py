@@ -225,6 +225,11 @@ class Effect:
     (False), as what it is there is known from the bodies; None: on both."""
 
     def __post_init__(self) -> None:
+        if not callable(self.law):
+            raise ValueError(f"the law of an effect is {self.law!r}; give a function")
+        if not isinstance(self.kind, Kind):
+            kinds = ", ".join(f"Kind.{kind.name}" for kind in Kind)
+            raise ValueError(f"effect {self.name}: its kind is {self.kind!r}; give one of {kinds}")
         names = [p.name for p in self.parameters]
         if len(set(names)) != len(names):
             raise ValueError(f"effect {self.name}: a parameter name is used twice")

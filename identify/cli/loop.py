@@ -41,10 +41,8 @@ from twin.errors import InputError
 from twin.telling import heard
 
 if TYPE_CHECKING:
-    from identify.experiment_design.rival_hypotheses import Rival
     from identify.output.words.next_step import Source
     from identify.results.results import Comparison, Diagnosis, FitResult, SimulationFit
-    from twin.effects import Catalogue
     from twin.model.machine import MachineModel
 
 
@@ -430,7 +428,7 @@ def plan(
         raise InputError(f"{out}: an experiment is a {SUFFIX} file; give such a name")
     machine, catalogue = loaded(model, effects)
     job = partial(
-        workflow.plan, between=[_rival(name, catalogue) for name in between or ()],
+        workflow.plan, between=between or (),
         catalogue=catalogue, axis=axis, duration=duration, test_function=test_function,
     )  # fmt: skip
     with engine(scheduler) as workers:
@@ -453,15 +451,6 @@ def plan(
         f"\n{out}: the experiment; `{run}` simulates it"
     )
     return replace(said, text=text)
-
-
-def _rival(name: str, catalogue: Catalogue) -> Rival:
-    """The model of that file, or the effect of that name."""
-    if name.endswith(".toml"):
-        from twin.model.file import load_model
-
-        return replace(load_model(name, catalogue), name=name)
-    return catalogue[name]
 
 
 @app.command()

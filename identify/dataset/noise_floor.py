@@ -41,6 +41,7 @@ from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array, between, local_parabola
 
+RESOLVED = 4e-6  # of a force: 18 bits, beyond what drives record and a simulation integrates
 _PARTS: WeakKeyDictionary[PreparedLog, dict[tuple[bool, int], tuple[float, float]]]
 _PARTS = WeakKeyDictionary()
 
@@ -51,7 +52,8 @@ class NoiseFloor:
 
     low, high: between which it is, with a probability of 95 %. most: the upper end without what
     rounding may add that the axis does not know, which is what a model lacks. parts: N RMS of each,
-    whose squares make up that of value: "sensors", white; "rounding" of the readings, where the
+    whose squares make up that of value: "sensors", white, of which at least what no recorder
+    resolves of the force; "rounding" of the readings, where the
     axis has an encoder with steps; "aliasing" of the command by a thinned log; "path", what laws
     with memory make of what the readings do not tell of it; "force", that no sensor makes.
     """
@@ -168,8 +170,10 @@ def _of_parts(
 
     sensors = [_unrounded(n, m) for n, m in zip(noises, motions, strict=True)]
     rounds, told = rounding_in(axis, logs) / gain, knows_rounding(axis, motions)
+    white = size([replace(n, folded=0.0) for n in sensors])
+    resolved = RESOLVED * _together([float(np.mean(log.command**2)) for log in logs], motions)
     parts = {
-        "sensors": size([replace(n, folded=0.0) for n in sensors]),
+        "sensors": float(np.hypot(white, resolved)),
         "rounding": rounds if told else 0.0,
         "aliasing": size([replace(n, force=n.folded, reading=0.0, folded=0.0) for n in noises]),
         "path": _together([_of_path(axis, log) for log in logs], motions) / gain,

@@ -96,7 +96,7 @@ def fit_simulated_motion(axis: AxisModel, logs: Sequence[PreparedLog]) -> Motion
             "not finite; fit the force residual first"
         )
     found = problem.settled(tried[int(np.nanargmin(costs))].x)
-    if problem.is_rough(found.x):
+    if problem.scaling.where and problem.is_rough(found.x):
         found = min(
             (found, problem.settled(problem.searched(found.x, rng))),
             key=lambda solution: problem.error(solution.x),

@@ -28,7 +28,7 @@ from identify.experiment_design.rival_hypotheses import (
     Rival,
     differing_axis,
     explained,
-    require_different,
+    rivals_of,
     simulated_dataset,
 )
 from identify.printed import Printed
@@ -91,7 +91,7 @@ def plan(
     holdout: GivenLogs | None = None,
     *,
     catalogue: Catalogue | None = None,
-    between: Sequence[Rival] = (),
+    between: Sequence[Rival | str | Path] = (),
     axis: str | None = None,
     duration: float = DURATION,
     test_function: float | None = None,
@@ -100,7 +100,8 @@ def plan(
 ) -> Plan:
     """Find the experiment within the machine's limits that decides between explanations.
 
-    between: effects, each added to the model, or models; refitted where there are logs. Where it is
+    between: effects or their names, each added to the model, or models or the paths of their files;
+    refitted where there are logs. Where it is
     empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
     separate, or for the best and the runner-up; without logs or a missing effect, it is for the
     model's own parameters. duration: of the experiment, s. over: what the experiments are tried
@@ -112,17 +113,17 @@ def plan(
     if axis is not None:
         model.axis(axis)
     require_length(duration, model.sample_rate)
-    require_different(between)
-    for rival in between:
+    rivals = rivals_of(between, catalogue)
+    for rival in rivals:
         if isinstance(rival, Effect):
             model.require_usable(rival, axis or next(iter(model.axes)))
     if not logs:
         require_test_function(test_function, duration)
     catalogue = usable(catalogue, model)
     progress("preparing the logs and the rivals", 0, 1)
-    dataset = _dataset(model, logs or {}, holdout or {}, between, axis, test_function, catalogue)
-    arena = _arena(model, dataset, bool(logs), between, catalogue, test_function, progress)
-    effects = {**catalogue, **{r.name: r for r in between if isinstance(r, Effect)}}
+    dataset = _dataset(model, logs or {}, holdout or {}, rivals, axis, test_function, catalogue)
+    arena = _arena(model, dataset, bool(logs), rivals, catalogue, test_function, progress)
+    effects = {**catalogue, **{r.name: r for r in rivals if isinstance(r, Effect)}}
     verified = 6  # experiments at most that are judged again by full refits
     return _planned(arena, duration, verified, not logs, effects, progress, over)
 

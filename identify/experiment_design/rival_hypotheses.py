@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from identify.dataset.dataset import Dataset
 from identify.dataset.noise_floor import floor_of
@@ -17,8 +18,10 @@ from identify.experiment_design.planting import strength_for
 from identify.selection.trying import try_effect
 from twin.checks import moves
 from twin.effect import Effect, Kind
+from twin.effects import Catalogue
 from twin.errors import CannotRun, InputError
 from twin.experiments.kinds import Tracking
+from twin.model.file import load_model
 from twin.model.machine import AxisModel, Fitted, MachineModel
 from twin.signals import Array
 from twin.simulation.simulate import simulate
@@ -97,8 +100,27 @@ def differing_axis(rivals: Sequence[Rival], machine: MachineModel) -> str:
     return next(iter(machine.axes))
 
 
-def require_different(rivals: Sequence[Rival]) -> None:
-    """Raise InputError where two rivals are the same."""
-    names = [r.name for r in rivals]
-    if len(set(names)) < len(names):
-        raise InputError(f"{names[0]} is given twice; give two different explanations")
+def rivals_of(given: Sequence[Rival | str | Path], catalogue: Catalogue) -> tuple[Rival, ...]:
+    """Effects and models by their names, where a file's path is that of a model.
+
+    Models of one name get a number each. Raises InputError where two of them are the same.
+    """
+    rivals = [_rival(one, catalogue) for one in given]
+    for i, rival in enumerate(rivals):
+        if rival in rivals[:i]:
+            raise InputError(f"{rival.name} is given twice; give two different explanations")
+    names = [rival.name for rival in rivals]
+    return tuple(
+        replace(rival, name=f"{rival.name} ({names[: i + 1].count(rival.name)})")
+        if isinstance(rival, MachineModel) and names.count(rival.name) > 1
+        else rival
+        for i, rival in enumerate(rivals)
+    )
+
+
+def _rival(given: Rival | str | Path, catalogue: Catalogue) -> Rival:
+    if isinstance(given, Effect | MachineModel):
+        return given
+    if str(given).endswith(".toml"):
+        return replace(load_model(given, catalogue), name=str(given))
+    return catalogue[str(given)]

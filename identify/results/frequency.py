@@ -14,6 +14,7 @@ import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
 from identify.printed import Printed, figure_of
+from twin.errors import InputError
 from twin.files import write_atomically
 from twin.signals import Array
 
@@ -40,18 +41,26 @@ class FrequencyResponse(Printed):
     def to_frd(self, axis: str | None = None) -> Any:
         """The plant of an axis, the first where None, as ``control.FRD`` of python-control.
 
-        In samples, as a digital controller meets it. Raises ModuleNotFoundError without it.
+        In samples, as a digital controller meets it. Raises InputError for an axis that has none,
+        ModuleNotFoundError without python-control.
         """
         import control
 
-        found = self.axes[axis or next(iter(self.axes))].measured.response
+        name = next(iter(self.axes)) if axis is None else axis
+        if name not in self.axes:
+            raise InputError(f"axis {name} has no response; give one of {', '.join(self.axes)}")
+        found = self.axes[name].measured.response
         return control.FRD(found.plant, 2.0 * np.pi * found.frequency, dt=found.period)
 
-    def write(self, path: Path) -> None:
-        """A table (.csv), or a message an axis and source (.mcap); not with another ending.
+    def write(self, path: Path | str) -> None:
+        """A table (.csv), or a message an axis and source (.mcap).
 
-        Columns are those of ``COLUMNS``, with units in the first line or in the schema.
+        Columns are those of ``COLUMNS``, with units in the first line or in the schema. Raises
+        InputError for another ending.
         """
+        path = Path(path)
+        if path.suffix not in FORMATS:
+            raise InputError(f"{path}: a frequency response is {' or '.join(FORMATS)}; name it so")
         write_atomically(path, FORMATS[path.suffix](self))
 
     def tables(self) -> Iterator[tuple[str, str, Mapping[str, Array]]]:

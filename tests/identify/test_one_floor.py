@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 from planted_logs import RATE, SLIDE, Ride, few, having, logged
 
 from identify import adding, workflow
+from identify.selection.diagnosis import Verdict
+from twin.model.file import load_model
 from twin.model.machine import MachineModel
+from twin.simulation.simulate import simulate
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 KNOWN = few("cogging", "spring", "quadratic_drag")
 HIDDEN = {
@@ -35,6 +43,23 @@ def test_every_command_tells_the_same_of_one_log(hidden: str, noise: float) -> N
         assert error == pytest.approx(own.error, rel=1e-3)
     for ratio in (compared.ratio, base.ratio):
         assert ratio == pytest.approx(own.ratio, rel=1e-2)
+
+
+@pytest.mark.short(2)
+@pytest.mark.parametrize("name", ["laas", "drive"])
+def test_a_log_without_noise_of_the_model_itself_leaves_nothing(name: str) -> None:
+    """LAAS left 66 times a floor that was 0 but for numbers: no interval, and no effect for it."""
+    model = load_model(EXAMPLES / f"{name}.toml")
+    quiet = {
+        axis: replace(own, hardware=replace(own.hardware, encoder_noise=0.0, current_noise=0.0))
+        for axis, own in model.axes.items()
+    }
+    model = replace(model, axes=quiet)
+    one, other = (simulate(model, "moves", seed=k, duration=4.0) for k in (1, 2))
+    (axis,) = quiet
+    found = workflow.diagnose(model, one, other, catalogue=KNOWN).axes[axis]
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.final.at_floor
 
 
 def test_errors_of_models_that_tell_of_other_parts_of_a_log_are_compared_where_both_do() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -73,6 +76,17 @@ def test_a_result_says_the_same_when_it_comes_back(result):
     found = again(given)
     assert json_of(found) == json_of(given)
     assert str(found) == str(given)
+
+
+@pytest.mark.short(2)
+def test_a_result_prints_in_a_process_that_has_asked_nothing_yet(tmp_path):
+    """It told "print it to read it" when it was printed behind a pool of processes."""
+    (tmp_path / "result").write_bytes(pickle.dumps(made.fit_result()))
+    code = "import pickle, sys; print(pickle.load(open(sys.argv[1], 'rb')))"
+    run = [sys.executable, "-c", code, str(tmp_path / "result")]
+    there = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    said = subprocess.run(run, capture_output=True, check=True, encoding="utf-8", env=there)
+    assert said.stdout == f"{made.fit_result()}\n"
 
 
 @pytest.mark.slow

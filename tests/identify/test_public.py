@@ -71,6 +71,8 @@ def test_a_fit_takes_a_log_a_path_a_list_and_a_dict_and_a_model_by_name(log, fil
         ({"a": None}, "training 'a': a NoneType is no log; give a Log"),
         (["none.mcap", "none.mcap"], "training: none.mcap is given twice"),
         ("none.mcap", "none.mcap: cannot be read: No such file"),
+        ([], "training: none is given; give a Log, the path of one"),
+        (None, "training: none is given; give a Log, the path of one"),
     ],
 )
 def test_what_is_no_log_is_one_line(given, said) -> None:
@@ -97,6 +99,7 @@ def test_a_file_may_name_an_effect_of_the_catalogue_that_is_given(tmp_path, monk
         (identify.fit, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
         (identify.diagnose, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
         (identify.feedforward, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
+        (identify.compare, ("m.toml", "none.mcap"), "none.mcap: cannot be read"),
         (identify.add_found, ("m.toml", "m.toml", "none.mcap"), "found nothing that this model"),
         (identify.agree, ("m.toml", "m.toml"), "no parameter has an interval in both"),
     ):
@@ -115,6 +118,26 @@ def test_logs_and_models_print_themselves_in_a_line(log) -> None:
     assert repr(model).startswith("<MachineModel Proton Motion Stage at 10000 Hz, ")
     assert repr(model.axes["x"]).startswith(f"<AxisModel of {model.axes['x'].mass:g} kg: ")
     assert max(len(repr(one)) for one in (log, log.axes["x"], model, model.axes["x"])) < 300
+
+
+def test_logs_are_equal_where_their_samples_are(log) -> None:
+    same = twin.simulate("proton_xy", "tracking", seed=1, duration=2.0)
+    other = twin.simulate("proton_xy", "tracking", seed=2, duration=2.0)
+    assert (log == same, log == other, log == 3) == (True, False, False)
+    assert log.axes["x"] == same.axes["x"] != other.axes["x"]
+    assert log in [other, same]
+
+
+def test_what_has_no_response_or_another_ending_is_one_line(tmp_path) -> None:
+    empty = identify.FrequencyResponse((), {})
+    for call, said in (
+        (lambda: empty.write(str(tmp_path / "x.foo")), "x.foo: a frequency response is .csv or"),
+        (lambda: identify.frequency_response([]), "log: none is given"),
+    ):
+        with pytest.raises(InputError, match=said):
+            call()
+    empty.write(str(tmp_path / "x.csv"))
+    assert (tmp_path / "x.csv").is_file()
 
 
 def test_a_comparison_for_viewers_is_told_from_a_log(log, tmp_path) -> None:

@@ -416,6 +416,14 @@ def logs_by_name(given: GivenLogs | None, role: str = "log") -> Mapping[str, Log
     return LogsByName(named)
 
 
+def some_logs(given: GivenLogs | None, role: str = "log") -> Mapping[str, Log]:
+    """The same of what cannot do without logs; raises InputError where none is given."""
+    logs = logs_by_name(given, role)
+    if not logs:
+        raise InputError(f"{role}: none is given; give a Log, the path of one, or several of them")
+    return logs
+
+
 def _require_log(log: object, what: str) -> None:
     if not isinstance(log, OneLog):
         raise InputError(

@@ -31,7 +31,12 @@ HELD = ("current", "force")  # held over a sample, so that their mean acts; all 
 ROTARY_UNITS = {name: rotary_unit(unit) for name, unit in LINEAR_UNITS.items()}
 
 
-@dataclass(frozen=True)
+def _same(one: Mapping[str, Array], other: Mapping[str, Array]) -> bool:
+    """Whether columns (n,) of the same names hold the same values."""
+    return one.keys() == other.keys() and all(np.array_equal(one[n], other[n]) for n in one)
+
+
+@dataclass(frozen=True, eq=False)
 class AxisLog:
     """Recorded signals of one axis.
 
@@ -53,6 +58,14 @@ class AxisLog:
         _require_one_length({name: len(column) for name, column in columns.items()}, "columns")
         object.__setattr__(self, "columns", columns)
         complete_units({n: u for n, u in self.units.items() if n in FIELDS})
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, AxisLog):
+            return NotImplemented
+        mine, its = ((dict(a.units), a.force_constant) for a in (self, other))
+        return mine == its and _same(self.columns, other.columns)
+
+    __hash__ = None  # type: ignore[assignment]  # it holds arrays
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -130,7 +143,7 @@ def complete_units(stated: Mapping[str, str]) -> dict[str, str]:
     return {**(ROTARY_UNITS if turning else LINEAR_UNITS), **stated}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Log:
     """One log: ``axes`` by name ("x", "y"), sampled at ``sample_rate`` (Hz) from t = 0.
 
@@ -150,6 +163,16 @@ class Log:
         if not 0.0 < self.sample_rate < np.inf:
             raise InputError(f"sample_rate is {self.sample_rate} Hz; give a number above 0")
         _require_one_length({name: len(axis) for name, axis in self.axes.items()}, "axes")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Log):
+            return NotImplemented
+        every = ("sample_rate", "axes", "metadata", "attachments")
+        same = all(getattr(self, name) == getattr(other, name) for name in every)
+        truth = self.truth.keys() == other.truth.keys()
+        return same and truth and all(_same(self.truth[a], other.truth[a]) for a in self.truth)
+
+    __hash__ = None  # type: ignore[assignment]  # it holds arrays
 
     def __len__(self) -> int:
         return len(next(iter(self.axes.values()), ()))

@@ -31,12 +31,13 @@ from identify.experiment_design.planting import (
     strength_for,
     visible_force,
 )
-from identify.experiment_design.rival_hypotheses import differing_axis, explained, require_different
+from identify.experiment_design.rival_hypotheses import differing_axis, explained, rivals_of
 from identify.output.machine import draw
 from identify.validation.free_run import free_run
 from twin.core.walks import walk
 from twin.effects import Catalogue
 from twin.errors import InputError
+from twin.model.file import save_model
 from twin.model.machine import AxisModel, MachineModel, axis_table
 from twin.model.parameters import free_parameters, read
 from twin.simulation.simulators import MujocoSimulator, ReducedSimulator
@@ -245,9 +246,21 @@ def test_models_differ_on_the_axis_where_they_do():
     assert differing_axis([a, c], a) == "y"
     assert differing_axis([a, replace(a, name="d")], a) == "x"
     assert differing_axis([CATALOGUE["wear"]], a) == "x"
-    require_different([a, b, CATALOGUE["wear"]])
-    with pytest.raises(InputError, match="a is given twice"):
-        require_different([a, b, a])
+
+
+def test_explanations_are_given_by_themselves_by_name_and_by_file(tmp_path):
+    """Two models of one machine have one name, and were refused as the same."""
+    a = MachineModel("a", {"x": PLAIN})
+    heavier = MachineModel("a", {"x": replace(PLAIN, mass=6.0)})
+    file = tmp_path / "b.toml"
+    save_model(a, file)
+    found = rivals_of([a, heavier, "wear", CATALOGUE["cogging"], str(file)], CATALOGUE)
+    assert [r.name for r in found] == ["a (1)", "a (2)", "wear", "cogging", str(file)]
+    for given in ([a, heavier, a], ["wear", CATALOGUE["wear"]]):
+        with pytest.raises(InputError, match="is given twice; give two different explanations"):
+            rivals_of(given, CATALOGUE)
+    with pytest.raises(InputError, match="nothing"):
+        rivals_of(["nothing"], CATALOGUE)
 
 
 def test_a_signature_has_its_force_on_one_motion_and_a_friction_its_own(tmp_path):

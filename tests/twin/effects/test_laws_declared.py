@@ -106,6 +106,19 @@ def test_a_declaration_that_makes_no_sense_is_refused(fault: str) -> None:
         declared(*BAD[fault])
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"kind": "force"}, "its kind is 'force'; give one of Kind.FRICTION, "),
+        ({"law": None}, "the law of an effect is None; give a function"),
+    ],
+)
+def test_a_kind_in_words_and_no_law_are_refused(given: dict[str, object], said: str) -> None:
+    """A kind in words passed every law, and a diagnosis ended in ValueError."""
+    with pytest.raises(ValueError, match=said):
+        replace(declared(), **given)
+
+
 def test_a_curve_is_bent_by_what_the_effect_holds() -> None:
     bent = Curve(Coordinate.SPEED, rubs=True, bent_by="n")
     held = declared(number("n", 2.0, 0.5, 4.0, fixed=True))
