@@ -3,6 +3,8 @@
 On machines of one axis and of two, linear and rotary, with names that hurt.
 """
 
+import ast
+import inspect
 import re
 import shlex
 from pathlib import Path
@@ -12,6 +14,8 @@ import typer
 from check_drive import drive
 from cli_runs import twin
 
+import identify
+import twin as toolbox
 from identify.cli.shared import app
 from identify.dataset.dataset import Role
 from identify.output.words.next_step import WRITE, Source
@@ -80,3 +84,15 @@ def test_a_next_step_names_the_files_that_were_given(text, model):
     written = found.get("better") or found["out"]
     assert Path(str(written)).suffix == ".toml"
     assert str(written) != model
+
+
+@pytest.mark.parametrize("text", [t for t in FILLED if "link_mass" not in t])
+def test_what_a_result_in_memory_prints_is_a_call_from_python(text):
+    """It printed "twin diagnose MODEL 'training 1'", which no shell runs."""
+    line = Source().filled(text.format(axis="x"), {Role.TRAINING: ["training 1"]})
+    called = ast.parse(line, mode="eval").body
+    assert isinstance(called, ast.Call)
+    package, name = ast.unparse(called.func).split(".")
+    taken = inspect.signature(getattr({"identify": identify, "twin": toolbox}[package], name))
+    named = {k.arg: k.value for k in called.keywords}
+    taken.bind(*called.args, **named)

@@ -41,7 +41,7 @@ class Source:
     """
 
     command: str = ""
-    model: str = "MODEL"
+    model: str = ""
     folder: Path = Path()
     options: tuple[str, ...] = ()
     written: str | None = None
@@ -50,7 +50,10 @@ class Source:
         """A command with this model and these logs in the place of MODEL and LOG...
 
         A plan reads no test logs. The last word, what is written, has another name than the model.
+        Where no file is known of the model, it is a call from Python.
         """
+        if not self.model:
+            return _as_call(text)
         given = [
             word
             for role, logs in names.items()
@@ -72,6 +75,21 @@ class Source:
 
 
 UNKNOWN = Source()
+
+
+def _as_call(text: str) -> str:
+    """A command of MODEL and LOG... as a call from Python, of a result that is called found."""
+    _, command, *words = text.split()
+    match command:
+        case "add":
+            return f"identify.add({words[0]!r}, model, logs, holdout)"
+        case "plan":
+            axis = words[words.index("--axis") + 1]
+            between = tuple(words[words.index("--between") + 1 : words.index("-o")])
+            return f"identify.plan(model, logs, holdout, axis={axis!r}, between={between})"
+    if text == WRITE:
+        return f"twin.save_model(found.model, {words[-1]!r})"
+    return f"identify.diagnose(model, logs).report({words[-1]!r})"
 
 
 def names_of(dataset: Dataset) -> dict[Role, list[str]]:

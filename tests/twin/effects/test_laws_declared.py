@@ -109,7 +109,7 @@ def test_a_declaration_that_makes_no_sense_is_refused(fault: str) -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"kind": "force"}, "its kind is 'force'; give one of Kind.FRICTION, "),
+        ({"kind": "force"}, "its kind is 'force'; give one of Kind.SENSING, "),
         ({"law": None}, "the law of an effect is None; give a function"),
     ],
 )
