@@ -66,8 +66,8 @@ class Catalogue(Mapping[str, Effect]):
         )
 
 
-def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
-    """The effects of this package, and those of the user's own Python files.
+def load_catalogue(user_files: Sequence[Path | str] | Path | str = ()) -> Catalogue:
+    """The effects of this package, and those of the user's own Python file, or files.
 
     Loading a user's file runs its code, first in a process of its own. Raises InputError where a
     file is missing, has the name of another effect, cannot be run, does not come to an end within
@@ -75,7 +75,8 @@ def load_catalogue(user_files: Sequence[Path] = ()) -> Catalogue:
     """
     names = [m.name for m in pkgutil.iter_modules(__path__)]
     effects = [importlib.import_module(f"{__name__}.{name}").EFFECT for name in names]
-    for path in map(Path, user_files):
+    given = [user_files] if isinstance(user_files, str | Path) else user_files
+    for path in map(Path, given):
         _require_name(path, Catalogue(effects))
         from twin.isolated import NoAnswer, isolated
 

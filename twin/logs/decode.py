@@ -15,7 +15,7 @@ from mcap.records import Attachment, Metadata
 
 from twin.errors import InputError, at
 from twin.logs.container import Damaged, Inflation, McapFile, Record, open_chunk, open_mcap
-from twin.logs.log import Array, AxisLog, Log
+from twin.logs.log import FIELDS, Array, AxisLog, Log
 from twin.logs.topics import (
     AXIS_PREFIX,
     TRUTH_PREFIX,
@@ -58,7 +58,7 @@ EVERYTHING = Wanted()
 
 def read_log(
     path: str | Path,
-    axes: Sequence[str] | None = None,
+    axes: Sequence[str] | str | None = None,
     *,
     fields: Sequence[str] | None = None,
     truth: bool = True,
@@ -72,9 +72,12 @@ def read_log(
     first from ``start`` on. Of a log with an index only the chunks with what is asked for are read.
 
     Every checksum of these is verified, and the samples must be complete, evenly spaced and finite.
-    Raises InputError otherwise, and where no axis has position and one of current and force.
+    Raises InputError otherwise, where no axis has position and one of current and force, and for a
+    field that no log has.
     """
-    wanted = Wanted(axes, fields, truth)
+    for name in set(fields or ()) - {*FIELDS}:
+        raise InputError(f"{path}: no log has a field {name}; give some of {', '.join(FIELDS)}")
+    wanted = Wanted([axes] if isinstance(axes, str) else axes, fields, truth)
     first, last = start or 0.0, math.inf if stop is None else stop
     if not first < last:
         raise InputError(f"{path}: start = {first:g} s is not before stop = {last:g} s")

@@ -262,7 +262,12 @@ def save_model(model: MachineModel, path: str | Path) -> None:
     replaced as a whole or not at all. Raises InputError where it cannot be written, where it could
     not be read again, and where the MJCF file beside it is another one.
     """
-    path, text = Path(path), format_model(model)
+    path = Path(path)
+    for name, axis in model.axes.items():
+        with at(f"{path}: axes.{name}"):
+            for fitted in axis.effects:
+                fitted.require_sound(axis.units)
+    text = format_model(model)
     _checked(tomllib.loads(text), str(path))
     if model.mjcf and model.mjcf_name:
         beside = path.parent / model.mjcf_name

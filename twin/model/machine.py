@@ -180,6 +180,20 @@ class Fitted:
         fixed = frozenset(p.name for p in effect.parameters if p.fixed)
         return cls(effect, merged, fixed)
 
+    def require_sound(self, units: AxisUnits = LINEAR) -> None:
+        """Raise InputError for values that are none of the effect's, and for others that are held.
+
+        units: of the axis, for messages.
+        """
+        known = {p.name for p in self.effect.parameters}
+        for name in (*self.fixed - known, *known - self.values.keys()):
+            raise InputError(
+                f"{self.effect.name}.{name}: is no value of the effect; give "
+                f"{', '.join(p.name for p in self.effect.parameters)}"
+            )
+        for name, value in self.values.items():
+            _check_value(self.effect, name, value, units)
+
     def vector(self) -> list[float]:
         """Values in the order of the effect's parameters."""
         return [self.values[p.name] for p in self.effect.parameters]

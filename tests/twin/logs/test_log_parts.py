@@ -92,6 +92,13 @@ def test_a_range_without_samples_is_refused(path, start, stop, why):
         read_log(path, start=start, stop=stop)
 
 
+def test_a_field_that_no_log_has_is_refused_and_one_axis_needs_no_list(path):
+    """A misspelt field was left out without a word."""
+    with pytest.raises(InputError, match="no log has a field postion; give some of setpoint_posi"):
+        read_log(path, fields=["postion", "force"])
+    assert read_log(path, axes="x", truth=False) == read_log(path, axes=["x"], truth=False)
+
+
 def test_some_fields_of_one_axis(path):
     got = read_log(path, ["y"], fields=("position", "force"), truth=False)
     assert {n: list(a.columns) for n, a in got.axes.items()} == {"y": ["position"]}

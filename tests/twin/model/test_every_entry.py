@@ -21,7 +21,7 @@ from twin.experiments.file import load_experiment, parse_experiment
 from twin.experiments.kinds import KINDS
 from twin.importers import load_mapping
 from twin.model.file import load_model, models_folder, parse_model, save_model
-from twin.model.machine import AxisModel, Hardware, MachineModel
+from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
 from twin.schemas import FOLDER, written
 
 WRONG: tuple[Any, ...] = (
@@ -160,6 +160,27 @@ def test_what_could_not_be_read_is_not_written(tmp_path: Path) -> None:
     text = answer(lambda: save_model(model, tmp_path / "m.toml"))
     assert text is not None
     assert text.startswith(f"{tmp_path / 'm.toml'}: axes.1: give")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("values", "fixed", "said"),
+    [
+        ({"a1": math.nan}, (), "cogging.a1 = nan: is not a finite number; give it in N"),
+        ({"p": 1e99}, (), "cogging.p = 1e+99 m: outside ["),
+        ({}, ("zz",), "cogging.zz: is no value of the effect; give p, a1"),
+    ],
+)
+def test_a_value_that_no_effect_has_is_not_written(
+    tmp_path: Path, values: dict[str, float], fixed: tuple[str, ...], said: str
+) -> None:
+    """They were written, and the file was refused when it was read."""
+    law = Fitted.at_start(CATALOGUE["cogging"])
+    law = Fitted(law.effect, {**law.values, **values}, frozenset(fixed))
+    model = MachineModel("m", {"x": AxisModel(1.0, effects=(law,))})
+    text = answer(lambda: save_model(model, tmp_path / "m.toml"))
+    assert text is not None
+    assert text.startswith(f"{tmp_path / 'm.toml'}: axes.x: {said}")
     assert not list(tmp_path.iterdir())
 
 
