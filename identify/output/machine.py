@@ -132,22 +132,12 @@ def draw(effect: Effect, motion: Motion, force: NDArray[np.float64], path: Path)
 
 def laws_text(reports: Sequence[LawReport]) -> str:
     """One line a law."""
-    outcomes = {True: "ok", False: "FAILED", None: "not tried"}
-    return "\n".join(
-        f"{r.effect}: {outcomes[o.holds]}: {o.law}{'' if o.holds else f': {o.fault}'}"
-        for r in reports
-        for o in r.outcomes
-    )
+    return "\n".join(map(str, reports))
 
 
 def check_text(reports: Mapping[str, CheckReport]) -> str:
     """One line a finding, or that there is none."""
-    lines = []
-    for name, report in reports.items():
-        lines += [f"{name}: {f.severity.value}: {f}" for f in report.findings]
-        if not report.findings:
-            lines.append(f"{name}: suitable for identification")
-    return "\n".join(lines)
+    return "\n".join(f"{name}: {line}" for name, r in reports.items() for line in r.lines())
 
 
 def minor(findings: Sequence[str]) -> list[str]:

@@ -106,3 +106,11 @@ class CheckReport:
     def ok(self) -> bool:
         """Whether the log may be fitted: there is no error, warnings aside."""
         return all(f.severity is not Severity.ERROR for f in self.findings)
+
+    def lines(self) -> list[str]:
+        """One a finding, or that there is none."""
+        every = [f"{f.severity.value}: {f}" for f in self.findings]
+        return every or ["suitable for identification"]
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())

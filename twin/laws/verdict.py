@@ -72,6 +72,13 @@ class LawReport:
         """Whether all laws hold."""
         return all(o.holds for o in self.outcomes)
 
+    def __str__(self) -> str:
+        said = {True: "ok", False: "FAILED", None: "not tried"}
+        return "\n".join(
+            f"{self.effect}: {said[o.holds]}: {o.law}{'' if o.holds else f': {o.fault}'}"
+            for o in self.outcomes
+        )
+
 
 def check_effect(effect: Effect) -> LawReport:
     """Try every law that holds for effects of this kind on the effect; takes a second or two.

@@ -14,7 +14,8 @@ RATE = 1000.0
 
 @pytest.mark.parametrize("rate", [500.0, 3000.0])
 def test_a_sound_drive_gives_no_finding(rate):
-    assert check_log(drive(rate, signals=FIELDS)).findings == ()
+    found = check_log(drive(rate, signals=FIELDS))
+    assert (found.findings, str(found)) == ((), "suitable for identification")
 
 
 UNKNOWN = "a scale or the sample rate is wrong"
