@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identify.dataset.body import ACCURACY
 from identify.dataset.dataset import Dataset
 from identify.dataset.test_function import OVERLAP
 from identify.estimation.evidence import blocks_of, effective_samples, rms
@@ -215,9 +216,11 @@ class Regression:
     def disagreeing(self, chosen: Sequence[int], found: GroupSolution, group: int) -> list[str]:
         """Names of the logs that by themselves tell another change of a group than all together.
 
-        Beside the same other groups, and the joints' own parameters as each log has them.
+        Beside the same other groups, and the joints' own parameters as each log has them. It
+        is the same that differs by less than files do: an unknown friction moves it as far.
         """
-        own, out = found.values[self.spans[group]], list[str]()
+        span = self.spans[group]
+        own, out = found.values[span], list[str]()
         numbers = np.unique(np.concatenate([self.training.log, self.other.log]))
         for number in numbers if numbers[1:].size else []:
             both = [r.some(r.log == number) for r in (self.training, self.other)]
@@ -225,7 +228,10 @@ class Regression:
             alone = replace(self, training=rows, other=rows)
             held, free = alone.solved(chosen, {group: own}), alone.solved(chosen)
             score = alone.score(held, free, len(numbers))
-            if replace(score, other=score.training).accepted:
+            whole, more = own + self.groups[group].corrected, free.values[span] - own
+            told, more = (rows.columns[:, span] @ by for by in (whole, more))
+            is_other = rms(more) > ACCURACY * rms(told)
+            if is_other and replace(score, other=score.training).accepted:
                 out.append(self.logs[number])
         return out
 

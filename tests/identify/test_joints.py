@@ -414,7 +414,10 @@ def test_a_payload_is_told_with_its_body_and_what_to_write(folder, tmp_path):
     assert answer_of(found).entries()["body"]["parameters"]["mass"]["unit"] == "kg"
     # The next command writes what is said into a copy of the file; then nothing is to be said.
     (element,) = re.findall("<inertial .*?/>", told)
-    assert "Next: twin add link_mass MODEL a --holdout b -o corrected.toml writes <inertial" in told
+    assert (
+        "Next: identify.correct_body(model, logs, holdout, file='corrected.xml') writes <inertial"
+        in told
+    )
     for name in ("arm.toml", "arm.xml"):
         shutil.copy(folder / name, tmp_path)
     for name, log in zip("ab", logs, strict=True):

@@ -86,7 +86,7 @@ def test_a_next_step_names_the_files_that_were_given(text, model):
     assert str(written) != model
 
 
-@pytest.mark.parametrize("text", [t for t in FILLED if "link_mass" not in t])
+@pytest.mark.parametrize("text", FILLED)
 def test_what_a_result_in_memory_prints_is_a_call_from_python(text):
     """It printed "twin diagnose MODEL 'training 1'", which no shell runs."""
     line = Source().filled(text.format(axis="x"), {Role.TRAINING: ["training 1"]})

@@ -81,6 +81,8 @@ def _as_call(text: str) -> str:
     """A command of MODEL and LOG... as a call from Python, of a result that is called found."""
     _, command, *words = text.split()
     match command:
+        case "add" if words[0] == LINK_MASS:
+            return "identify.correct_body(model, logs, holdout, file='corrected.xml')"
         case "add":
             return f"identify.add({words[0]!r}, model, logs, holdout)"
         case "plan":
