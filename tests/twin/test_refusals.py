@@ -60,6 +60,11 @@ MM, MIXED = {"position": "mm"}, {"position": "m", "force": "N m"}
         (lambda: holding(velocity=[1.0, None, [2.0], 3.0]), "velocity is no column of numbers"),
         (lambda: replace(ONE, units=MM), "unit of position is 'mm', allowed is m or rad"),
         (lambda: replace(ONE, units=MIXED), "force in N m, position in m: units of a rotary"),
+        (
+            lambda: AxisLog({"force": np.zeros(4)}).position,
+            "the log has no position of an axis, but",
+        ),
+        (lambda: AxisLog({"position": np.zeros(4)}).force, "the log has neither force nor current"),
         (lambda: replace(LOG, sample_rate=0.0), "sample_rate is 0.0 Hz; give a number above 0"),
         (
             lambda: replace(LOG, axes={"x": ONE, "y": AxisLog({"position": np.zeros(3)})}),

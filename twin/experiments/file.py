@@ -56,7 +56,7 @@ def load_experiment(path: str | Path) -> Experiment:
     """Read an experiment. Raises InputError naming the file, the entry and what is allowed."""
     path = Path(path)
     if not path.exists():
-        raise InputError(f"{path}: no such experiment file; `twin plan` writes one, or give a name")
+        raise InputError(f"{path}: no such experiment file; `twin plan` writes one")
     table = read_toml(path).get("experiment")
     with at(str(path)):
         if not isinstance(table, dict):

@@ -85,7 +85,8 @@ class ColumnMap(_Column):
     sign: Literal[1, -1] = Field(1, description="1 or -1")
     delay_samples: int = Field(
         0, ge=-(10**6), le=10**6,
-        description="a whole number: by how many samples the column was recorded too late",
+        description="a whole number, -1000000 to 1000000: by how many samples the column was "
+        "recorded too late",
     )  # fmt: skip
     counts_per_turn: float | None = Field(
         None, gt=0.0, description="a number above 0: counts of the encoder in one turn"

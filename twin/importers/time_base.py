@@ -163,6 +163,11 @@ def rate_of(time: Array) -> float:
     _require_no_return(time)
     elapsed = time - time[0]
     steps = np.diff(elapsed)
+    if len(steps) and (steps < 0.0).all():
+        raise InputError(
+            f"the time runs backwards, from {instant(time[0])} in the first row to "
+            f"{instant(time[-1])} in the last; sort the rows by their time"
+        )
     period = float(np.median(steps))
     rate = len(steps) / max(float(elapsed[-1]), 1e-9)  # less than none is refused below
     if abs(round(rate) / rate - 1.0) * len(steps) < jitter:

@@ -85,7 +85,10 @@ class AxisLog:
 
     @property
     def position(self) -> Array:
-        """(n,) encoder reading in m."""
+        """(n,) encoder reading in m. Raises InputError where there is none."""
+        if "position" not in self.columns:
+            has = ", ".join(self.columns) or "nothing"
+            raise InputError(f"the log has no position of an axis, but {has}; record the encoder")
         return self.columns["position"]
 
     @property
@@ -93,6 +96,11 @@ class AxisLog:
         """(n,) commanded force in N: recorded, or force constant x current. Raises InputError."""
         if "force" in self.columns:
             return self.columns["force"]
+        if "current" not in self.columns:
+            has = ", ".join(self.columns) or "nothing"
+            raise InputError(
+                f"the log has neither force nor current of an axis, but {has}; record one of them"
+            )
         if self.force_constant is None:
             raise InputError(
                 f"the log has current (A) but no force and no force constant ({self.kind('N/A')}); "

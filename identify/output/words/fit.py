@@ -163,7 +163,8 @@ def no_interval_in_words(reason: NoInterval) -> str:
 
 def estimate_in_words(e: Estimate) -> tuple[str, str]:
     """A value with its unit; its 90 % interval, or why it has none."""
-    scale = DisplayUnit.of(e.unit, [e.value])
+    wide = 0.0 if e.low is None or e.high is None else 0.05 * (e.high - e.low)  # far beyond it
+    scale = DisplayUnit.of(e.unit, [e.value, wide])
     if not e.free:
         return scale.text(e.value), "fixed"
     if e.low is None or e.high is None:

@@ -128,10 +128,15 @@ def next_commands(found: AxisDiagnosis, plan: Plan | None = None) -> list[str]:
 def model_in_words(result: Diagnosis) -> str:
     """What the model is that a diagnosis writes."""
     named = [finding.effect for found in result.axes.values() for finding in found.findings]
-    body = [f"body {result.body.body}"] if result.body and result.body.element else []
-    if not (named or body):
+    bodies = [f"body {found.body}" for found in result.bodies]
+    if not (named or bodies):
         return "the fitted model, as nothing was found"
-    return f"the model with {listed([*body, *dict.fromkeys(named)])}, fitted together"
+    return f"the model with {listed([*bodies, *dict.fromkeys(named)])}, fitted together"
+
+
+def tell(logs: Sequence[str]) -> str:
+    """E.g. "a tells", "a and b tell"."""
+    return f"{listed(logs)} {'tell' if logs[1:] else 'tells'}"
 
 
 # --- planned experiments --------------------------------------------------------------------------
@@ -331,7 +336,7 @@ def _of(body: WrongBody, among: Sequence[WrongBody]) -> str:
 def disputed_in_words(disputed: Mapping[str, Sequence[str]]) -> list[str]:
     """That the logs tell each another change of a body, so that none can be told."""
     return [
-        f"The logs disagree about body {body}: {listed(logs)} tell another change of its inertia "
+        f"The logs disagree about body {body}: {tell(logs)} another change of its inertia "
         "than the training logs, so that the load is not the same in all, or is held another way; "
         "diagnose them one by one."
         for body, logs in disputed.items()
@@ -347,14 +352,16 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
         f"The inertia of body {name} is not as {file} has it (confidence "
         f"{percent(found.confidence)}): it removes {percent(score.part)} of what all joints leave "
         "above their noise floors; the same torques shifted in time, which cannot be real, at most "
-        f"{percent(score.control)} (19 of 20 times).",
-        f"More than in the file, about its own frame: {', '.join(more)}.",
+        f"{percent(max(score.control, 0.0))} (19 of 20 times).",
+        f"More than in the file, about its own frame: {', '.join(more)}."
+        if found.differing
+        else "Of no parameter alone do the joints tell it, of several together they do.",
     ]
     if found.undetermined:
         said.append(f"These joints do not tell its {listed(found.undetermined)}.")
     if found.disagreeing:
         said.append(
-            f"The logs disagree about it: {listed(found.disagreeing)} tell another change, so that "
+            f"The logs disagree about it: {tell(found.disagreeing)} another change, so that "
             "the load is not the same in all, or is held another way; diagnose them one by one."
         )
     errors = [

@@ -97,7 +97,7 @@ def test_logs_of_a_load_that_is_held_another_way_disagree():
     found = diagnose(model, *logs, catalogue=FEW)
     assert not found.bodies
     assert found.disputed == {"link3": ("1",)}
-    assert str(found).startswith("The logs disagree about body link3: 1 tell another change")
+    assert str(found).startswith("The logs disagree about body link3: 1 tells another change")
     assert json_of(found)["disputed"] == {"link3": ["1"]}
 
 

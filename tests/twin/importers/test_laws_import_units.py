@@ -124,3 +124,9 @@ def test_times_that_stop_repeat_or_leave_a_gap_name_the_row(row):
         with pytest.raises(InputError, match="does not increase") as caught:
             rate_of(times(1000.0, 50, {row - 1: part}))
         assert f"{before:.9g} s is followed by {at:.9g} s in row {row}" in str(caught.value)
+
+
+def test_rows_in_the_reverse_order_are_said_to_be_that() -> None:
+    """They were told to be -0.0005 s a sample apart, and to be resampled at 1e+09 Hz."""
+    with pytest.raises(InputError, match=r"the time runs backwards, from 0\.004 s .*; sort the r"):
+        rate_of(np.arange(5)[::-1] * 1e-3)
