@@ -35,7 +35,9 @@ from twin.mujoco.reading import read_bodies
 from twin.mujoco.transmission import HINGE, SLIDE, Transmission, transmission_of
 from twin.signals import Array
 
-CALLS = ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM")
+CALLS = (
+    "mj_kinematics", "mj_comPos", "mj_tendon", "mj_makeM", "mj_comVel", "mj_rne", "mj_mulM",
+)  # fmt: skip
 AHEAD = 1e-6  # rad or m, by which the joints move on, of the change of the mass matrix
 PASSIVE = ("damping", "stiffness", "frictionloss", "armature")  # of an axis, which are effects here
 
@@ -242,7 +244,7 @@ def strip_passive(
 
 @compiled(nogil=True)
 def _along(calls, model, data, off, position, velocity, smooth, lent, momentum, force):
-    kinematics, com_pos, make_m, com_vel, rne, mul_m = calls
+    kinematics, com_pos, tendon, make_m, com_vel, rne, mul_m = calls
     n_dofs = position.shape[0]
     moved, before, after, bias = lent
     qpos = view(word_at(data + off[2]), n_dofs)  # hinges and slides: as many as degrees of freedom
@@ -257,6 +259,7 @@ def _along(calls, model, data, off, position, velocity, smooth, lent, momentum, 
             fastest = max(fastest, abs(qvel[i]))
         call_at(kinematics, (model, data))
         call_at(com_pos, (model, data))
+        call_at(tendon, (model, data))  # whose armature the mass matrix has
         call_at(make_m, (model, data))
         call_at(mul_m, (model, data, after.ctypes.data, moved.ctypes.data))
         for i in range(n_dofs):
@@ -269,6 +272,7 @@ def _along(calls, model, data, off, position, velocity, smooth, lent, momentum, 
             qpos[i] += ahead * qvel[i]
         call_at(kinematics, (model, data))
         call_at(com_pos, (model, data))
+        call_at(tendon, (model, data))  # whose armature the mass matrix has
         call_at(make_m, (model, data))
         call_at(mul_m, (model, data, after.ctypes.data, speed))
         for i in range(n_dofs):

@@ -82,6 +82,23 @@ def test_momentum_form_is_the_inverse_dynamics(of):
     assert np.all(np.abs(ours - np.transpose(wanted)).max(axis=1) < 1e-6 * largest)
 
 
+def test_a_rotor_behind_a_belt_of_several_joints_is_felt_at_each_of_them():
+    """The armature of a fixed tendon was no part of a fit, and of every simulation."""
+    belt = """<tendon><fixed name="belt" armature="0.01"><joint joint="shoulder" coef="3"/>
+    <joint joint="elbow" coef="-2"/></fixed></tendon></mujoco>"""
+    q, v, a = smooth_motion(1e-3, 5)
+    geared, plain = (
+        mechanism_of(text, "arm.xml", OWN) for text in (ARM.replace("</mujoco>", belt), ARM)
+    )
+    way = np.array([0.0, 3.0, -2.0])
+    more = geared.along(q, v, v)[0] - plain.along(q, v, v)[0]
+    np.testing.assert_allclose(more, 0.01 * np.outer(way, way) @ v, atol=1e-9)
+    np.testing.assert_allclose(
+        geared.carried(q, a) - plain.carried(q, a), 0.01 * np.outer(way, way) @ a, atol=1e-9
+    )
+    np.testing.assert_allclose(geared.inertia - plain.inertia, 0.01 * way**2, atol=1e-9)
+
+
 def test_what_holds_and_accelerates_bodies_is_the_inverse_dynamics_at_rest():
     q, _, a = smooth_motion(1e-3, 5)
     carried = mechanism_of(ARM, "arm.xml", OWN).carried(q, a)
