@@ -227,6 +227,11 @@ class Effect:
     def __post_init__(self) -> None:
         if not callable(self.law):
             raise ValueError(f"the law of an effect is {self.law!r}; give a function")
+        if not self.name.isidentifier():
+            raise ValueError(
+                f"the law of an effect is defined in {self.name}, whose name is no name of an "
+                "effect; write it to a Python file of its own, such as my_effect.py"
+            )
         if not isinstance(self.kind, Kind):
             kinds = ", ".join(f"Kind.{kind.name}" for kind in Kind)
             raise ValueError(f"effect {self.name}: its kind is {self.kind!r}; give one of {kinds}")

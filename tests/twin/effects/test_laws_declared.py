@@ -4,6 +4,7 @@ What a declaration refuses is tried on both sides of each bound."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -262,3 +263,11 @@ def test_their_number_is_never_fitted_and_few_numbers_are_unless_asked(effect, t
 def test_a_bad_number_of_elements_is_refused(effect: Effect, count: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"whole number of elements from 1 to 1000"):
         loaded(tmp_path, effect.name, f"elements = {count}")
+
+
+def test_a_law_of_no_file_is_refused() -> None:
+    """In a notebook an effect was called <ipython-input-1-...>, by which no model is read again."""
+    place: dict[str, Any] = {}
+    exec(compile("def law(p, s, io):\n    io[0] = io[1]", "<ipython-input-1-14ed>", "exec"), place)
+    with pytest.raises(ValueError, match=r"defined in <ipython-input-1-14ed>, .*; write it to a P"):
+        Effect(Kind.FORCE, "s", "F", "none", (number("a", 1.0, 0.0, 3.0),), place["law"], "f", "e")
