@@ -299,8 +299,8 @@ def diagnose(
         {a: d.final for a, d in axes.items()}, {a: d.dataset for a, d in axes.items()}
     )
     axes = {a: d.beside(away.fits[a], away.datasets[a]) for a, d in axes.items()}
-    bases = {a: d.base for a, d in axes.items()}
-    bodies = tuple(body.told_beside(bases, away.datasets) for body in away.bodies)
+    finals = {a: d.final for a, d in axes.items()}
+    bodies = tuple(body.told_beside(finals, away.datasets) for body in away.bodies)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     model = _begun(result.model, axes, summaries)

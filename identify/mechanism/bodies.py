@@ -30,7 +30,7 @@ class WrongBody:
     effects of joints ("rotor_inertia of elbow"). axes: whose forces it changes.
     inertial, change, band (10,): each of INERTIAL as the file has it, by how much it is more, and
     half the 90 % band of that; no number where the logs do not tell it. score: over all joints.
-    errors: N, of each axis without and with all bodies that were found. disagreeing: names of the
+    errors: N, of each axis without and with all that was found. disagreeing: names of the
     logs that by themselves tell another change.
     """
 

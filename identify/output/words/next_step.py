@@ -319,14 +319,15 @@ def body_in_words(result: Diagnosis, source: Source = UNKNOWN) -> list[str]:
     if not result.bodies:
         return []
     file, said = result.fitted.mjcf_name, list[str]()
+    others = [f.effect for axis in result.axes.values() for f in axis.findings]
     for found in result.bodies:
-        said += wrong_body_in_words(found, result.fitted)
+        said += wrong_body_in_words(found, result.fitted, [*dict.fromkeys(others)])
     # Beside what joints lack a body is another than alone.
-    lacking = any(axis.findings for axis in result.axes.values())
-    command = WRITE if lacking else f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
+    command = WRITE if others else f"twin add {LINK_MASS} MODEL LOG... -o corrected.toml"
     filled = source.filled(command, names_of(next(iter(result.axes.values())).dataset))
     elements = " and ".join(f"{b.written} into {_of(b, result.bodies)}" for b in result.bodies)
-    return [*said, f"Next: {filled} writes {elements}, in a copy of {file}."]
+    what = f"{source.written} has written" if source.written else f"Next: {filled} writes"
+    return [*said, f"{what} {elements}, in a copy of {file}."]
 
 
 def _of(body: WrongBody, among: Sequence[WrongBody]) -> str:
@@ -343,8 +344,13 @@ def disputed_in_words(disputed: Mapping[str, Sequence[str]]) -> list[str]:
     ]
 
 
-def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
-    """That a body is not as its file has it, by how much, and the errors without and with it."""
+def wrong_body_in_words(
+    found: WrongBody, model: MachineModel, others: Sequence[str] = ()
+) -> list[str]:
+    """That a body is not as its file has it, by how much, and the errors without and with it.
+
+    others: what was found beside it, with which the errors are too.
+    """
     file, name = model.mjcf_name, " or ".join((found.body, *found.tied))
     score = found.score
     more = (f"{part} {with_band(*told, INERTIAL[part])}" for part, told in found.differing.items())
@@ -370,5 +376,6 @@ def wrong_body_in_words(found: WrongBody, model: MachineModel) -> list[str]:
         if axis in found.axes
     ]
     on = found.errors[found.axes[0]].on.value
-    said.append(f"Error on the {on} logs without and with it: {', '.join(errors)}.")
+    what = listed(["it", *others])
+    said.append(f"Error on the {on} logs without and with {what}: {', '.join(errors)}.")
     return said
