@@ -41,7 +41,7 @@ from identify.rules import RULE
 from twin.model.machine import AxisModel
 from twin.signals import Array, between, local_parabola
 
-RESOLVED = 4e-6  # of a force: 18 bits, beyond what drives record and a simulation integrates
+RESOLVED = 1e-8  # of a force: what numbers keep through its averages; no recorder resolves as much
 _PARTS: WeakKeyDictionary[PreparedLog, dict[tuple[bool, int], tuple[float, float]]]
 _PARTS = WeakKeyDictionary()
 
@@ -52,10 +52,10 @@ class NoiseFloor:
 
     low, high: between which it is, with a probability of 95 %. most: the upper end without what
     rounding may add that the axis does not know, which is what a model lacks. parts: N RMS of each,
-    whose squares make up that of value: "sensors", white, of which at least what no recorder
-    resolves of the force; "rounding" of the readings, where the
-    axis has an encoder with steps; "aliasing" of the command by a thinned log; "path", what laws
-    with memory make of what the readings do not tell of it; "force", that no sensor makes.
+    whose squares make up that of value: "sensors", white, and at least what numbers keep of the
+    force; "rounding" of the readings, where the axis has an encoder with steps; "aliasing" of the
+    command by a thinned log; "path", what laws with memory make of what the readings do not tell of
+    it; "force", that no sensor makes.
     """
 
     value: float

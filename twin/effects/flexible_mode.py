@@ -30,15 +30,12 @@ def attach(mount, values):
 
 
 def frequencies(e: Excitation) -> tuple[float, ...]:
-    """Frequencies to try, up to what the log's blocks resolve.
+    """Frequencies to try: steps of an eighth, up to what the log's blocks resolve.
 
-    Steps of an eighth from those of joints behind gears on; below, of a payload that hangs on a
-    rope, steps of a third from what the log's length resolves.
+    From those of joints behind gears on.
     """
-    highest, lowest = max(min(400.0, 0.25 / e.period), 20.0), max(0.2, 2.0 / e.duration)
-    slow = (4.0 / 1.3**k for k in range(int(log(max(4.0 / lowest, 1.0)) / log(1.3)), 0, -1))
-    joints = (4.0 * 1.125**k for k in range(int(log(highest / 4.0) / log(1.125)) + 1))
-    return *slow, *joints
+    highest = max(min(400.0, 0.25 / e.period), 20.0)
+    return tuple(4.0 * 1.125**k for k in range(int(log(highest / 4.0) / log(1.125)) + 1))
 
 
 EFFECT = Effect(
