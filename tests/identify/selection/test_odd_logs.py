@@ -272,10 +272,13 @@ def of_silence(seed: int, number: int, catalogue: Catalogue = FEW) -> tuple[Case
 
 @pytest.mark.slow
 def test_what_all_logs_lack_is_no_delay_of_one() -> None:
-    """A late motor, which nothing here explains: sines seemed 0.45 ms early, 1.7 times as far."""
+    """A late motor, which nothing here explains: sines seemed 0.45 ms early, 1.7 times as far.
+
+    Of all that is asked, the friction of such a drive alone is there: it remembers.
+    """
     case, told = of_silence(92, 4)
     assert case.spoiled is None
-    assert not told.findings
+    assert {f.effect for f in told.findings} <= {"lugre"}
     assert told.dataset.odd is None
 
 

@@ -388,7 +388,7 @@ def test_viscous_friction_alone_is_named_where_there_is_no_friction() -> None:
     assert found.findings[0].parameters["c"] == pytest.approx(0.8, rel=0.02)
 
 
-@pytest.mark.short(2)
+@pytest.mark.slow  # 6 s
 def test_a_payload_that_swings_on_a_rope_is_a_mode_of_the_load() -> None:
     """A mode began at 1 Hz, so that the frame alone was named for a swing of 0.7 Hz, with 99 %."""
     true = having(SLIDE, "flexible_mode", load=0.25, frequency=0.7, damping=0.05)
