@@ -154,7 +154,8 @@ def test_the_pages_of_public_measurements_are_true(name, named, shared_data, tmp
 
 
 def without_figures(text: str) -> str:
-    return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
+    """And without the spaces before them: a figure that begins with a minus is wider."""
+    return re.sub(r" *[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
