@@ -47,3 +47,15 @@ def neat(value: float) -> float:
         return 0.0
     digits = 2 - math.floor(math.log10(value))
     return float(f"{math.floor(value * 10.0**digits * (1.0 + 1e-12)) / 10.0**digits:.3g}")
+
+
+def require_number(
+    name: str, value: float, unit: str, *, zero: bool = False, most: float = math.inf
+) -> None:
+    """Raise InputError for what is no number above 0 (``zero``: or 0), and no larger than most."""
+    fine = is_number(value) or value == math.inf
+    if fine and (value > 0.0 or (zero and value == 0.0)) and value <= most:
+        return
+    least = "a number from 0" if zero else "a number above 0"
+    limit = "" if most == math.inf else f", at most {most:g}"
+    raise InputError(f"{name} = {value!s:.60} {unit}: give {least}{limit}")

@@ -13,7 +13,7 @@ from twin.core.native import Table, build_table
 from twin.effect import ELEMENTS, LEAST, MOST, Effect, Kind, Parameter
 from twin.errors import CannotRun, InputError
 from twin.model.units import LINEAR, ROTARY, AxisUnits
-from twin.numbers import is_number
+from twin.numbers import is_number, require_number
 
 
 @dataclass(frozen=True)
@@ -82,18 +82,6 @@ class HardwareEntry:
 def _of_hardware(default: Any, *args: Any, **kwargs: Any) -> Any:
     """A field of the hardware with its ``HardwareEntry``."""
     return field(default=default, metadata={"entry": HardwareEntry(*args, **kwargs)})
-
-
-def require_number(
-    name: str, value: float, unit: str, *, zero: bool = False, most: float = math.inf
-) -> None:
-    """Raise InputError for what is no number above 0 (``zero``: or 0), and no larger than most."""
-    fine = is_number(value) or value == math.inf
-    if fine and (value > 0.0 or (zero and value == 0.0)) and value <= most:
-        return
-    least = "a number from 0" if zero else "a number above 0"
-    limit = "" if most == math.inf else f", at most {most:g}"
-    raise InputError(f"{name} = {value!s:.60} {unit}: give {least}{limit}")
 
 
 @dataclass(frozen=True)
