@@ -204,9 +204,8 @@ def correct_body(
             "they show"
         )
     found = found.beside(found.fits, found.datasets)
-    bodies = tuple(body.told_beside(found.fits, found.datasets) for body in found.bodies)
-    made = corrected(before.model, bodies, found.fits, file)
-    return CorrectedBody(made, before.model, bodies)
+    made = corrected(before.model, found.bodies, found.fits, file)
+    return CorrectedBody(made, before.model, found.bodies)
 
 
 @parallel()

@@ -299,14 +299,12 @@ def diagnose(
         {a: d.final for a, d in axes.items()}, {a: d.dataset for a, d in axes.items()}
     )
     axes = {a: d.beside(away.fits[a], away.datasets[a]) for a, d in axes.items()}
-    finals = {a: d.final for a, d in axes.items()}
-    bodies = tuple(body.told_beside(finals, away.datasets) for body in away.bodies)
     progress("intervals and the next experiment", 0, 1)
     summaries = {axis: summary_of(d) for axis, d in axes.items()}
     model = _begun(result.model, axes, summaries)
     plans, not_planned = next_experiments(axes, model, test_function)
     prepared = result.datasets if away.bodies else {axis: d.dataset for axis, d in axes.items()}
-    better = with_all_found(model, axes, summaries, bodies)
+    better = with_all_found(model, axes, summaries, away.bodies)
     comparing = partial(progress, "comparing with all that was found")
     return Diagnosis(
         fitted=model,
@@ -318,7 +316,7 @@ def diagnose(
         not_tried={a: not_tried(result.given, d, catalogue) for a, d in result.datasets.items()},
         not_planned=not_planned,
         left_over=_left_over(axes),
-        bodies=bodies,
+        bodies=away.bodies,
         disputed=away.disputed,
         recording=given.recording,
         model=better,

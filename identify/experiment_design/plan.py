@@ -101,12 +101,12 @@ def plan(
     """Find the experiment within the machine's limits that decides between explanations.
 
     between: effects or their names, each added to the model, or models or the paths of their files;
-    refitted where there are logs. Where it is
-    empty, the logs are diagnosed, and the plan is for the effects that the diagnosis cannot
-    separate, or for the best and the runner-up; without logs or a missing effect, it is for the
-    model's own parameters. duration: of the experiment, s. over: what the experiments are tried
-    on, threads of this process or the workers of an engine. Raises InputError for an unknown axis,
-    an axis whose travel is not known, and explanations that are the same.
+    refitted where there are logs. Where it is empty, the logs are diagnosed, and the plan is for
+    the effects that the diagnosis cannot separate, or for the best and the runner-up; without logs
+    or a missing effect, it is for the model's own parameters. duration: of the experiment, s. over:
+    what the experiments are tried on, threads of this process or the workers of an engine. Raises
+    InputError for an unknown axis, an axis whose travel is not known, and explanations that are the
+    same.
     """
     catalogue = load_catalogue() if catalogue is None else catalogue
     model = as_model(model, catalogue)

@@ -13,8 +13,7 @@ from functools import cache
 import numpy as np
 
 from identify.dataset.body import INERTIAL
-from identify.dataset.dataset import Dataset
-from identify.estimation.errors import Errors, error_in
+from identify.estimation.errors import Errors
 from identify.estimation.fit import Fit
 from identify.selection.acceptance import Score
 from identify.selection.findings import confidence
@@ -44,14 +43,6 @@ class WrongBody:
     score: Score
     errors: Mapping[str, Errors]
     disagreeing: tuple[str, ...] = ()
-
-    def told_beside(self, fits: Mapping[str, Fit], datasets: Mapping[str, Dataset]) -> WrongBody:
-        """The same, its errors those of fits beside all bodies as they are told."""
-        errors = {
-            axis: replace(own, after=error_in(own.on, fits[axis], datasets[axis]))
-            for axis, own in self.errors.items()
-        }
-        return replace(self, errors=errors)
 
     @property
     def differing(self) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,7 @@ import numpy as np
 from identify.dataset.body import ACCURACY, Body
 from identify.dataset.dataset import Dataset
 from identify.estimation.alignment import fit_aligned
-from identify.estimation.errors import Errors
+from identify.estimation.errors import Errors, error_in
 from identify.estimation.fit import Fit, fit_axis
 from identify.estimation.found_shape import held_strengths
 from identify.estimation.intervals import half_widths_by
@@ -93,20 +93,26 @@ class Departures:
         told = _Estimated.of(
             _regression(_all_on_beginnings(fits, datasets), [*moved, *gains]), moved
         )
-        bodies = tuple(
-            replace(
-                body, band=np.hypot(told.bands[body.body], told.changes[body.body]),
-                disagreeing=told.disagreeing[body.body],
-            )
-            for body in self.bodies
-        )  # fmt: skip
         own = {g.place: g.body for g in moved if g.body is not None}
         others = _with_changed(datasets, [(own[n], more) for n, more in told.changes.items()])
         again = {a: _refitted(fits[a], dataset) for a, dataset in others.items()}
-        if sum(f.ratio**2 for f in again.values()) > sum(f.ratio**2 for f in fits.values()):
-            return replace(now, bodies=bodies)
-        changed = (replace(b, change=b.change + told.changes[b.body]) for b in bodies)
-        return replace(now, fits=again, datasets=others, bodies=tuple(changed))
+        less = sum(f.ratio**2 for f in again.values()) > sum(f.ratio**2 for f in fits.values())
+        if not less:
+            now = replace(self, fits=again, datasets=others)
+
+        def anew(body: WrongBody) -> WrongBody:
+            more = told.changes[body.body]
+            errors = {
+                axis: replace(e, after=error_in(e.on, now.fits[axis], now.datasets[axis]))
+                for axis, e in body.errors.items()
+            }
+            return replace(
+                body, change=body.change if less else body.change + more, errors=errors,
+                band=np.hypot(told.bands[body.body], more),
+                disagreeing=told.disagreeing[body.body],
+            )  # fmt: skip
+
+        return replace(now, bodies=tuple(map(anew, self.bodies)))
 
     def asked_again(
         self, axes: Mapping[str, AxisDiagnosis], progress: Progress = silent

@@ -101,8 +101,9 @@ class AxisDiagnosis:
         """
         if dataset is self.dataset:
             return self
-        base = replace(fit_axis(self.base.axis, dataset.training), begun=self.base.begun)
-        final = base if self.final is self.base else final
+        base = final
+        if self.final is not self.base:
+            base = replace(fit_axis(self.base.axis, dataset.training), begun=self.base.begun)
         quiet = final.at_floor or Judged(final, dataset).other_at_floor
 
         def anew(errors: Errors) -> Errors:
