@@ -32,7 +32,7 @@ from typing import Any
 from twin.curve import Curve, FreeShape, Part
 from twin.errors import InputError
 from twin.excitation import Excitation as Excitation  # effects' files take it from here
-from twin.knee import Imitation, Knee
+from twin.knee import REACH, Imitation, Knee
 
 # Slots of ``io``. Compiled laws freeze these numbers.
 INDEX = 0  # sample index, 0 at the first sample
@@ -299,6 +299,10 @@ class Effect:
         """What other law it is with these values on that motion; None where it is itself."""
         told = (knee.imitation(values, covered) for knee in self.knees)
         return next((found for found in told if found), None)
+
+    def bends(self, values: Mapping[str, float], covered: Excitation) -> float:
+        """Distance over which its contacts bend before they slide, m; 0 where it has none."""
+        return max((k.size(values, covered) for k in self.knees if k.name == REACH), default=0.0)
 
     @cached_property
     def _names(self) -> frozenset[str]:

@@ -13,6 +13,7 @@ from enum import Enum
 from twin.excitation import Excitation
 
 Values = Mapping[str, float]
+REACH = "reach"  # the name of a knee: how far contacts bend before they slide, m
 
 
 class Imitated(Enum):

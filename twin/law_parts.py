@@ -26,7 +26,7 @@ from twin.effect import (
     Parameter,
     V,
 )
-from twin.knee import Imitated, Knee
+from twin.knee import REACH, Imitated, Knee
 
 # --- what makes a law itself ----------------------------------------------------------------------
 
@@ -61,7 +61,7 @@ def slips_after(size: Callable[[Mapping[str, float]], float]) -> Knee:
     """
     clearly = 1.5  # counts
     return Knee(
-        "reach", "m", lambda v, e: size(v),
+        REACH, "m", lambda v, e: size(v),
         lambda v, e: (max(e.shortest, clearly * e.resolution), 0.5 * (e.been[1] - e.been[0])),
         Imitated.DRY_FRICTION, Imitated.SPRING,
     )  # fmt: skip

@@ -154,7 +154,7 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> Refus
     dataset = before.dataset
     for fitted in (f for f in fit.axis.effects if f.effect.name == effect.name):
         ended = [label for label in at_bounds(fit, effect.name) if label.split(".")[-1] in own]
-        if imitation := imitation_of(fitted, ended, dataset.excitation):
+        if imitation := imitation_of(fit.axis, fitted, ended, dataset.excitation):
             return OutsideKnee.imitating(imitation, fit.axis)
         if ended:
             return EndsAtBound(tuple(ended))
@@ -175,9 +175,13 @@ def doubt(before: Judged, fit: Fit, effect: Effect, own: Sequence[str]) -> Refus
     return None
 
 
-def imitation_of(fitted: Fitted, ended: Sequence[str], covered: Excitation) -> Imitation | None:
-    """What a law is where it is not itself; ended: labels of what a fit held where it still is."""
+def imitation_of(
+    axis: AxisModel, fitted: Fitted, ended: Sequence[str], covered: Excitation
+) -> Imitation | None:
+    """What a law of an axis is where it is not itself; ended: labels of what a fit held there."""
     effect, values = fitted.effect, fitted.values
+    beside = max((f.effect.bends(f.values, covered) for f in axis.effects), default=0.0)
+    covered = replace(covered, bends=beside)
     names = [label.split(".")[-1] for label in ended]
     past = [
         {**values, n: values[n] * (1.0 + way * 2.0 * AT_EDGE)} for n in names for way in (-1, 1)

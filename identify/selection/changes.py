@@ -263,7 +263,7 @@ def from_all_starts(judged: Judged, screening: Screening, first: Fit) -> Fit:
 def _rank(judged: Judged, change: Added, fit: Fit) -> tuple[bool, float]:
     """A law that has become another tells nothing, however much it takes."""
     law = fit.axis[change.name]
-    other = law.effect.imitation(law.values, judged.dataset.excitation) is not None
+    other = imitation_of(fit.axis, law, (), judged.dataset.excitation) is not None
     return other, fit.error
 
 
@@ -310,7 +310,7 @@ def _held_inside(fit: Fit, judged: Judged, effect: Effect) -> Fit:
     """
     fitted, ended = fit.axis[effect.name], at_bounds(fit, effect.name)
     names = [label.split(".")[-1] for label in ended]
-    if not names or imitation_of(fitted, ended, judged.dataset.excitation):
+    if not names or imitation_of(fit.axis, fitted, ended, judged.dataset.excitation):
         return fit
     half = {n: 0.5 * (effect.parameter(n).start + fitted.values[n]) for n in names}
     values, fixed = {**fitted.values, **half}, fitted.fixed.union(names)

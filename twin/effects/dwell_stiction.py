@@ -44,7 +44,11 @@ EFFECT = Effect(
     law=law,
     knees=(
         at("time", "s", lambda e: (e.period, e.duration), Imitated.DRY_FRICTION),
-        at("slip", "m", lambda e: (0.0, e.travel), above=Imitated.DRIFT),
+        # contacts are renewed as they slide, not as they bend: a shorter slip has no peak to show
+        at(
+            "slip", "m", lambda e: (e.bends, e.travel),
+            Imitated.WITHOUT_PEAK, Imitated.DRIFT,
+        ),
     ),
     fingerprint="residual peak at the start of a motion, higher the longer the rest before it",
     excited_by="slow starts after rests of very different lengths",

@@ -15,6 +15,7 @@ from identify.dataset.dataset import Dataset
 from identify.estimation.fit import Fit, fit_axis, fit_themselves, turned
 from identify.output.words.findings import finding_in_words
 from identify.output.words.refusal import refusal_in_words
+from identify.selection.candidates import imitation_of
 from identify.selection.findings import FindingKind
 from identify.selection.refusal import OutsideKnee
 from identify.selection.trying import try_effect
@@ -174,3 +175,16 @@ def test_a_friction_out_of_step_is_no_late_motor():
     found = asked(light, light, few("actuator_lag", "actuator_delay"), rubbed, SHORT)
     (finding,) = found.findings
     assert (finding.effect, finding.kind) == ("coulomb_viscous", FindingKind.WRONG_SHAPE)
+
+
+@pytest.mark.parametrize(
+    ("friction", "imitated"),
+    [({"Fc": 1.0, "Fs": 1.5, "sigma0": 5e4}, Imitated.WITHOUT_PEAK), ({}, None)],
+)
+def test_what_a_law_is_depends_on_the_friction_beside_it(friction, imitated):
+    """A slip of 2 um is within the 20 um that bristles bend, and beyond what dry contacts do."""
+    held = having(BARE, "lugre" if friction else "coulomb_viscous", **friction)
+    axis = having(held, "dwell_stiction", growth=1.0, slip=2e-6)
+    _, dataset = fitted(BARE, SLIDE)
+    found = imitation_of(axis, axis["dwell_stiction"], (), dataset.excitation)
+    assert (found and found.of) is imitated
