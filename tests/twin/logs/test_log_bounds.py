@@ -76,10 +76,10 @@ def test_an_answer_takes_seconds_and_little_memory(case: str, tmp_path: Path) ->
     path.write_bytes(CASES[case]())
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for read in (read_log, recover_log):
-        began = time.perf_counter()
+        began = time.process_time()
         with pytest.raises(InputError) as refused:
             read(path)
-        assert time.perf_counter() - began < SECONDS
+        assert time.process_time() - began < SECONDS
         assert "\n" not in str(refused.value)
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     assert grown < MEGABYTES + path.stat().st_size / 2**20
