@@ -46,7 +46,7 @@ def save_of(result: object, path: Path) -> None:
     raise TypeError(f"a {type(result).__name__} has no JSON")
 
 
-def _hooked(hook: Callable[..., Any], *given: object) -> Any:
+def hooked(hook: Callable[..., Any], *given: object) -> Any:
     """What a hook says of a result; one that was unpickled may be the first that is asked."""
     import_module("identify.output.printing")
     return hook(*given)
@@ -56,7 +56,7 @@ class Printed:
     """A result whose ``str`` is the text that its command prints; in a notebook, tables."""
 
     def __str__(self) -> str:
-        return _hooked(text_of, self)
+        return hooked(text_of, self)
 
     def __repr__(self) -> str:
         of = getattr(self, "model", None)
@@ -68,10 +68,10 @@ class Printed:
 
         It appears whole or not at all. Raises InputError where its folder does not exist.
         """
-        _hooked(save_of, self, Path(path))
+        hooked(save_of, self, Path(path))
 
     def _repr_html_(self) -> str | None:
-        return _hooked(html_of, self)
+        return hooked(html_of, self)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Residual:
 
     def against(self, coordinate: str, axis: str | None = None) -> Figure:
         """It over a coordinate, such as "position"; of the leading axis where none is named."""
-        return _hooked(figure_of, self.of, coordinate, axis)
+        return hooked(figure_of, self.of, coordinate, axis)
 
 
 class Pictured(Printed):
@@ -90,14 +90,14 @@ class Pictured(Printed):
 
     def plot(self, axis: str | None = None) -> Figure:
         """The residual over the coordinate that the answer is about."""
-        return _hooked(figure_of, self, None, axis)
+        return hooked(figure_of, self, None, axis)
 
     def report(self, path: Path | str) -> None:
         """Write the page that ``twin compare`` and ``twin diagnose`` write with -o: one HTML file.
 
         It appears whole or not at all. Raises InputError where its folder does not exist.
         """
-        _hooked(report_of, self, Path(path))
+        hooked(report_of, self, Path(path))
 
     @property
     def residual(self) -> Residual:

@@ -7,6 +7,7 @@ function of position holds for both, and a model with it would not generalise. T
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,14 +187,15 @@ class Repeat:
     unit: str = LINEAR.force
     period_unit: str = LINEAR.position
     phase_unit: str = "rad"
+    same: ClassVar[float] = 0.5
+    """Difference of two terms over the larger, below which they are one."""
 
     @property
     def general(self) -> bool:
         """Whether one sine of position holds for all logs."""
         terms = [a * np.exp(1j * self.phase[n]) for n, a in self.amplitude.items()]
         size = max(self.amplitude.values())
-        same = 0.5  # difference of two terms over the larger, below which they are one
-        return all(abs(t - terms[0]) < same * size for t in terms)
+        return all(abs(t - terms[0]) < self.same * size for t in terms)
 
 
 def not_general(fit: Fit, dataset: Dataset) -> Repeat | None:

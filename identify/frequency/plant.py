@@ -76,7 +76,7 @@ def plant_of(found: Response, most: int = 4) -> Plant:
     if len(told.frequency) < 12:
         raise InputError(
             f"the response is told at {len(told.frequency)} of {len(found.frequency)} frequencies, "
-            "too few for a mass; excite the axis more: `twin simulate multisine`"
+            "too few for a mass; excite the axis more, as with a multisine"
         )
     # of a response: the error that a polynomial over a resonance may have of its own
     nearest = 0.01

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identify.frequency.of_logs import AxisFrequency, Shown
-from identify.printed import Printed, figure_of
+from identify.printed import Printed, figure_of, hooked
 from twin.errors import InputError
 from twin.files import write_atomically
 from twin.signals import Array
@@ -36,7 +36,7 @@ class FrequencyResponse(Printed):
 
     def plot(self) -> Figure:
         """The Bode diagram of each axis."""
-        return figure_of(self, None, None)
+        return hooked(figure_of, self, None, None)
 
     def to_frd(self, axis: str | None = None) -> Any:
         """The plant of an axis, the first where None, as ``control.FRD`` of python-control.

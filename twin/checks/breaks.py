@@ -125,9 +125,8 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
     if abs(step) <= 6.0 * axis.possible_jump:  # times the jump that motion allows
         if last - first > CLUSTER:
             return None
-        off = float(axis.jumps[first - 1 : last].max())
-        a_sample = 2.0  # times the motion of a sample
-        fault = Fault.UNEVEN if off < a_sample * abs(speed) * dt else Fault.OUTLIERS
+        off = _off_course(x[first - 1 : last + 2])
+        fault = Fault.UNEVEN if off < abs(speed) * dt else Fault.OUTLIERS  # a sample's motion
         return Break(fault, first, last, off)
     setpoint = axis.log.columns.get("setpoint_position")
     follows = _around(setpoint, first, last) if setpoint is not None else None
@@ -142,6 +141,11 @@ def _classified(axis: Axis, first: int, last: int) -> Break | None:
     if 0.5 < samples <= gap * axis.sample_rate:
         return Break(Fault.MISSING, first, last, float(round(samples)), step)
     return Break(Fault.STEP if alike else Fault.JOINED, first, last, step, step)
+
+
+def _off_course(x: Array) -> float:
+    """How far samples (n,) m are at most from the straight line between the first and the last."""
+    return float(np.abs(x - np.linspace(x[0], x[-1], len(x))).max())
 
 
 def _around(x: Array, first: int, last: int) -> tuple[float, float, float] | None:
@@ -168,7 +172,7 @@ def _finding(axis: Axis, fault: Fault, found: list[Break]) -> LogFinding:
         Fault.OUTLIERS: f"samples of the position are off by up to {size}",
         Fault.JOINED: f"position and motion differ on both sides by {size}: logs were joined",
         Fault.STEP: f"the position steps by {size} and goes on as before: counts were lost",
-        Fault.UNEVEN: f"the position is off by {size}, less than two samples' motion: a clock "
+        Fault.UNEVEN: f"the position is off by {size}, less than a sample's motion: a clock "
         "skipped",
     }[fault]
     remedy = {

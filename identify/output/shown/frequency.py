@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MORE = "a multisine excites more, as `twin simulate multisine --model MODEL` runs"
+
 
 @blocks_of.register
 def frequency_blocks(result: FrequencyResponse) -> list[Block]:
@@ -49,7 +51,7 @@ def _caution(axis: AxisFrequency) -> str:
         of = f"of the model's own {own} its simulation on this motion shows {back}"
     return (
         f"{mass}, delay and loop are not read off: {of}, as friction is too much of the force; "
-        "`twin simulate multisine` excites more"
+        f"{MORE}"
     )
 
 
@@ -67,7 +69,7 @@ def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
     if axis.bias is not None:
         return facts
     if shown.plant is None:
-        few = "too few frequencies to read it off; `twin simulate multisine` excites more"
+        few = f"too few frequencies to read it off; {MORE}"
         return [*facts, (units.mass_name, few), _loop(shown)]
     return [*facts, *_plant(shown.plant, found.period, units), _loop(shown)]
 
@@ -78,8 +80,8 @@ def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str
         facts.append(("viscous damping", _with_band(plant.damping, units("N s/m"))))
     if _is_there(plant.stiffness):
         facts.append(("stiffness", _with_band(plant.stiffness, units("N/m"))))
-    samples = f"{plant.delay.value / period:.2f} samples"
-    facts.append(("delay", f"{_with_band(plant.delay, 's')}, {samples}"))
+    delay = f"{_with_band(plant.delay, 's')}, {plant.delay.value / period:.2f} samples"
+    facts.append(("delay", delay if math.isfinite(plant.delay.band) else "not told"))
     for i, mode in enumerate(plant.modes, start=1):
         frequency, ratio = _with_band(mode.frequency, "Hz"), _with_band(mode.damping, "1")
         side = "motor and encoder on one side" if mode.gain.value > 0.0 else "beyond the spring"

@@ -392,10 +392,12 @@ def repeat_in_words(repeat: Repeat) -> str:
     """E.g. "a force repeats every 2.5 mm: 1.0 N in run, 0.9 N in pulses; ..."."""
     words = units_of(repeat.unit).words
     sizes = ", ".join(f"{quantity(a, repeat.unit)} in {n}" for n, a in repeat.amplitude.items())
-    turns = np.degrees(np.ptp(np.unwrap(list(repeat.phase.values()))))
+    turns = np.ptp(np.unwrap(list(repeat.phase.values())))
+    apart = 2.0 * np.sin(0.5 * min(turns, np.pi)) >= Repeat.same  # of two that are alike in size
+    other = f"phase differs between the logs by {np.degrees(turns):.0f} degrees"
     return (
         f"a {words('force')} repeats every {quantity(repeat.period, repeat.period_unit)} of travel "
-        f"({sizes}), but its phase differs between the logs by {turns:.0f} degrees: it is present "
+        f"({sizes}), but its {other if apart else 'size differs between the logs'}: it is present "
         f"in each log, but no function of {words('position')} holds for all of them, so no effect "
         "is named"
     )

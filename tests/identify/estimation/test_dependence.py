@@ -114,6 +114,7 @@ def test_a_repeat_is_general_where_its_terms_are_alike():
     words = repeat_in_words(repeat(1.0))
     assert "repeats every 2.50 mm of travel (1.00 N in a, 1.00 N in b)" in words
     assert "by 57 degrees" in words
+    assert "its size differs between the logs: it" in repeat_in_words(repeat(0.05, 0.3))
 
 
 def test_a_force_with_another_phase_in_each_log_is_told():

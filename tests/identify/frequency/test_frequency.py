@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import pickle
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +39,14 @@ Setpoint = Callable[[int, np.random.Generator], Array]
 def recorded(setpoint: Setpoint, machine: TwoMasses = MACHINE, seed: int = 1) -> LoopSignals:
     rng = np.random.default_rng(seed)
     return machine.run(setpoint(SAMPLES, rng), rng)
+
+
+def read_off_log() -> Log:
+    """A log of the machine, all of whose plant can be read off."""
+    record = recorded(wandering)
+    return Log(1.0 / record.period, {"x": AxisLog({
+        "setpoint_position": record.setpoint, "force": record.force, "position": record.position,
+    })})  # fmt: skip
 
 
 @pytest.mark.parametrize("setpoint", [multisine, wandering])
@@ -267,6 +279,18 @@ def test_a_page_shows_it_beside_the_model(log: Path, elastic: MachineModel, tmp_
     assert len(re.findall(r"77\.\d+ ± ", row[1])) == 2  # measured and model
 
 
+def test_a_response_is_drawn_by_a_process_that_has_printed_nothing(tmp_path: Path) -> None:
+    """`twin frf --plot` drew before it printed: "a FrequencyResponse has no residual"."""
+    found = identify.frequency_response(read_off_log())
+    (tmp_path / "found").write_bytes(pickle.dumps(found))
+    code = "import pickle, sys; pickle.load(open(sys.argv[1], 'rb')).plot().savefig(sys.argv[2])"
+    run = [sys.executable, "-c", code, str(tmp_path / "found"), str(tmp_path / "bode.png")]
+    there = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(run, capture_output=True, text=True, env=there, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "bode.png").exists()
+
+
 def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "rest.mcap"
     still = {n: np.zeros(4000) for n in ("position", "setpoint_position", "force")}
@@ -277,11 +301,7 @@ def test_a_log_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
 
 def test_a_response_is_python_controls_frd() -> None:
     control = pytest.importorskip("control")
-    record = recorded(wandering)
-    log = Log(1.0 / record.period, {"x": AxisLog({
-        "setpoint_position": record.setpoint, "force": record.force, "position": record.position,
-    })})  # fmt: skip
-    found = identify.frequency_response(log)
+    found = identify.frequency_response(read_off_log())
     frd = found.to_frd("x")
     assert isinstance(frd, control.FRD)
     assert answer_of(found)
