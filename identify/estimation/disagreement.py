@@ -111,6 +111,16 @@ def odd_in(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
     return _at_rest(axis, deciding)
 
 
+def odd_in_all(axis: AxisModel, dataset: Dataset) -> Disagreement | None:
+    """The log that surely disagrees with all others, the test logs among them.
+
+    It may be told where those that decide are too few to tell it; as test logs decide nothing, no
+    log is left out for what this says.
+    """
+    odd = disagreeing(axis, dataset.logs) if dataset.test else None
+    return odd if odd and odd.is_sure else None
+
+
 def _at_rest(axis: AxisModel, logs: Sequence[PreparedLog]) -> Disagreement | None:
     """The log with one moment of its rests that stands out against all of all logs, if any.
 

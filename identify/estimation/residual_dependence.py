@@ -1,5 +1,8 @@
 """What a residual varies with: the coordinate that accounts for most of it, and what repeats.
 
+What varies may be a value of the model, such as the inertia of a winder or the gain of a motor that
+warms: then the residual is the acceleration, or the motor's force, times a curve over a coordinate.
+
 A term of one turn of a screw or a ball is real in each log; where its phase differs between logs no
 function of position holds for both, and a model with it would not generalise. That is said.
 """
@@ -7,6 +10,7 @@ function of position holds for both, and a model with it would not generalise. T
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from enum import Enum
 from typing import ClassVar
 
 import numpy as np
@@ -31,6 +35,13 @@ BINS = (24, 96, 384)  # numbers of bins along a coordinate
 SAME_PERIOD = 0.02  # relative difference, or of a turn, within which two are one
 
 
+class Varying(Enum):
+    """What of a model varies with a coordinate: then the error is in proportion to its force."""
+
+    INERTIA = "inertia"
+    GAIN = "gain"  # of the motor, as its magnets warm or its voltage is at an end
+
+
 @record
 class Dependence:
     """On what coordinate an error depends."""
@@ -43,6 +54,8 @@ class Dependence:
     """Of the coordinate."""
     shares: Mapping[str, Number]
     """The same part of every coordinate."""
+    varies: Varying | None = None
+    """What varies with the coordinate, where the error is more clearly in proportion to that."""
 
 
 # Of a linear axis; ``unit_of`` gives those of any.
@@ -74,14 +87,17 @@ def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) 
     return units(known.get(coordinate, LINEAR.position))
 
 
-def share(residual: Array, coordinate: Array) -> float:
+def share(residual: Array, coordinate: Array, along: Array | None = None) -> float:
     """Part of the residual's square that its means over bins of the coordinate explain, 0..1.
 
     The finest of several widths is taken that the data carry, each adjusted for what as many bins
-    explain of noise with the same effective sample size.
+    explain of noise with the same effective sample size. along (n,): to what it is in proportion in
+    each bin, where it is no force by itself; a value of a model varies slowly, by few bins.
     """
+    if along is not None:
+        return _share(residual, coordinate, along, BINS[0])
     widths = [bins for bins in BINS if bins == BINS[0] or len(residual) > 5 * bins]
-    return max(_share(residual, coordinate, bins) for bins in widths)
+    return max(_share(residual, coordinate, np.ones(len(residual)), bins) for bins in widths)
 
 
 def _foremost(shares: Mapping[str, float]) -> str:
@@ -95,26 +111,62 @@ def _foremost(shares: Mapping[str, float]) -> str:
     return other if name == "time" and rest[other] > RULE.rather * shares[name] else name
 
 
-def _share(residual: Array, coordinate: Array, bins: int) -> float:
+def _share(residual: Array, coordinate: Array, along: Array, bins: int) -> float:
     levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, bins + 1)))
     if len(levels) < 2:
         return 0.0
     index = np.clip(np.searchsorted(levels, coordinate, side="right") - 1, 0, len(levels) - 2)
-    count = np.maximum(np.bincount(index, minlength=len(levels) - 1), 1)
-    mean = np.bincount(index, residual, len(levels) - 1) / count
-    explained = float(np.sum(mean[index] * residual) / np.sum(residual**2))
-    n = effective_samples(residual - mean[index])
-    k = (count > 0).sum()
+    square = np.bincount(index, along**2, len(levels) - 1)
+    slope = np.bincount(index, along * residual, len(levels) - 1) / np.where(square, square, 1.0)
+    told = slope[index] * along
+    explained = float(np.sum(told * residual) / np.sum(residual**2))
+    n = effective_samples(residual - told)
+    k = len(square)
     return max(1.0 - (1.0 - explained) * n / max(n - k, 1.0), 0.0) if n > k else 0.0
 
 
 def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     """The coordinate on which the residual of a fit depends most, and its period if it has one."""
-    taken, lines = _shares(base.residual, *_where(base, dataset))
+    where, begins = _where(base, dataset)
+    taken, lines = _shares(base.residual, where, begins)
     shares = {name: float(share) for name, share in taken.items()}
-    name = _foremost(shares)
-    unit = unit_of(name, dataset.training[0].motion)
-    return Dependence(shares[name], name, lines.get(name), unit, shares)
+    name, motion = _foremost(shares), dataset.training[0].motion
+    found = Dependence(shares[name], name, lines.get(name), unit_of(name, motion), shares)
+    for what, along in _forces(base, dataset, where).items():
+        by = {c: share(base.residual, where[c], along) for c in where if _may_vary(what, c)}
+        name = _foremost(by)
+        # nearly all of it, as what varies leaves little else
+        if by[name] > max(found.share_of_error * _times_more(found), RULE.rather):
+            found = Dependence(by[name], name, None, unit_of(name, motion), shares, what)
+    return found
+
+
+def _times_more(found: Dependence) -> float:
+    """How much more of an error a value that varies has to explain than what was found first.
+
+    More than a force by itself does, but of time, of which any force of one run is a function.
+    """
+    if found.varies:
+        return 1.0
+    return RULE.rather if found.depends_on == "time" else 1.0 / RULE.rather
+
+
+def _may_vary(what: Varying, coordinate: str) -> bool:
+    """Whether a value may vary with a coordinate: an inertia by what was moved where and when."""
+    of_motor = what is Varying.GAIN and coordinate in ("velocity", *OF_CHANNELS)
+    return of_motor or coordinate.endswith(("position", "time"))
+
+
+def _forces(base: Fit, dataset: Dataset, where: Mapping[str, Array]) -> dict[Varying, Array]:
+    """To what the error of a value is in proportion, (n,) on the windows of a fit.
+
+    Of the motor's force what the model knows: the noise of its reading is in the residual too.
+    """
+    command = np.concatenate([log.command for log in dataset.training])[base.kept]
+    return {
+        Varying.INERTIA: where["acceleration"],
+        Varying.GAIN: command - base.residual,
+    }
 
 
 def dependences(force: Array, fit: Fit, dataset: Dataset) -> dict[str, float]:

@@ -47,12 +47,14 @@ ALIKE = 1.5  # times the error of other logs that noise may have in one
 class Remainder:
     """What a fit leaves of some logs, beside where the motion was.
 
-    force (n,): N, less what the fit's own parameters can add, basis (n, k). where: coordinates
-    (n,) by name. past (n, p): what moved before. logs (n,): the number of the log of each.
+    force (n,): N, less what the fit's own parameters can add, basis (n, k). known (n,): N, of the
+    motor, as the model has it. where: coordinates (n,) by name. past (n, p): what moved before.
+    logs (n,): the number of the log of each.
     """
 
     force: Array
     basis: Array
+    known: Array
     where: dict[str, Array]
     past: Array
     logs: NDArray[np.int64]
@@ -65,7 +67,9 @@ class Remainder:
         log = np.repeat(np.arange(len(logs)), [len(each) for each in logs])
         every = gathered(logs)
         where = {name: values[kept] for name, values in every.items()}
-        return cls(unabsorbed(force, basis), basis, where, _past(every, log)[kept], log[kept])
+        known = np.concatenate([each.command for each in logs])[kept] - force
+        past = _past(every, log)[kept]
+        return cls(unabsorbed(force, basis), basis, known, where, past, log[kept])
 
     def is_predictable(self) -> bool:
         """Whether a part of the force that matters follows from something measured."""
@@ -132,17 +136,27 @@ class Remainder:
         return np.asarray(np.max(parts, axis=0))
 
     def _predictors(self) -> Iterator[Array]:
-        """Columns (n, k) over each coordinate, and of the past."""
+        """Columns (n, k) over each coordinate, of the past, and of values that vary.
+
+        These are the inertia and the motor's gain: to them the force is in proportion.
+        """
         for name in self.where.keys() - {"time", "direction"}:
             yield self._over(name)
         yield self.past
+        for along in (self.where["acceleration"], self.known):
+            for name in ("time", "position", "velocity"):
+                yield self._hats(name) * (along / rms(along))[:, None]
 
     def _over(self, name: str) -> Array:
         """Curves over a coordinate (n, k), alike both ways and not."""
+        hats = self._hats(name)
+        return np.hstack([hats, hats * self.where["direction"][:, None]])
+
+    def _hats(self, name: str) -> Array:
+        """A curve over a coordinate, by its knots (n, k)."""
         at = self.where[name]
         knots = np.unique(np.quantile(at, np.linspace(0.0, 1.0, HATS)))
-        hats = np.stack([np.interp(at, knots, unit) for unit in np.eye(len(knots))], axis=1)
-        return np.hstack([hats, hats * self.where["direction"][:, None]])
+        return np.stack([np.interp(at, knots, unit) for unit in np.eye(len(knots))], axis=1)
 
     def has_line(self) -> bool:
         """Whether it repeats, in time or along the track."""

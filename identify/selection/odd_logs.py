@@ -16,7 +16,7 @@ from functools import cache
 from identify.dataset.dataset import Dataset
 from identify.dataset.odd_log import Disagreement
 from identify.estimation.alignment import realigned
-from identify.estimation.disagreement import odd_in, suspect
+from identify.estimation.disagreement import odd_in, odd_in_all, suspect
 from identify.estimation.errors import error_on
 from identify.estimation.evidence import rms
 from identify.estimation.fit import Fit, fit_axis
@@ -132,10 +132,18 @@ def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]
     return replace(fit_axis(base.axis, rest.training), begun=base.begun), rest
 
 
+def odd_told_by_all(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
+    """The log that surely disagrees with all others beside all that was found."""
+    return odd_in_all(ended.found.final.fit.axis, _as_found(ended, dataset))
+
+
 def _odd_beside(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
     """The log that disagrees with the others beside all that was found."""
+    return odd_in(ended.found.final.fit.axis, _as_found(ended, dataset))
+
+
+def _as_found(ended: Conclusion, dataset: Dataset) -> Dataset:
+    """All logs as those that were concluded from: so late, and by test functions of that length."""
     found = ended.found.dataset
     there = realigned(dataset, found.channel_delay)
-    if found.length != dataset.length:
-        there = there.at_length(found.length)
-    return odd_in(ended.found.final.fit.axis, there)
+    return there if found.length == dataset.length else there.at_length(found.length)

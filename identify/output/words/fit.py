@@ -19,7 +19,7 @@ from identify.estimation.intervals import (
     NotExcited,
     OpenSided,
 )
-from identify.estimation.residual_dependence import Dependence, Repeat
+from identify.estimation.residual_dependence import Dependence, Repeat, Varying
 from identify.estimation.simulated_motion import MotionFit
 from identify.output.numbers import (
     DisplayUnit,
@@ -384,8 +384,15 @@ def dependence_in_words(dependence: Dependence) -> str:
     on = units_of(dependence.unit).words(spaced(dependence.depends_on))
     return (
         f"The error depends most on {on}, which accounts for "
-        f"{percent(dependence.share_of_error)} of the squared error{period}."
+        f"{percent(dependence.share_of_error)} of the squared error{period}"
+        f"{VARIES[dependence.varies] if dependence.varies else ''}."
     )
+
+
+VARIES = {
+    Varying.INERTIA: ", as of an inertia that changes with it",
+    Varying.GAIN: ", as of a motor's gain that changes with it",
+}
 
 
 def repeat_in_words(repeat: Repeat) -> str:

@@ -122,7 +122,8 @@ def headline_in_words(found: AxisDiagnosis) -> str:
         case Verdict.UNEXPLAINED:
             answer = "something outside the catalogue is missing"
         case Verdict.NOTHING_MISSING:
-            answer = "nothing is missing"
+            unknown = found.dataset.force_noise or not found.final.at_floor
+            answer = "nothing that is missing shows" if unknown else "nothing is missing"
     against = ", ".join(f.effect for f in found.contradicted)
     return spaced(f"{answer} (contradicted by the test logs: {against})" if against else answer)
 
