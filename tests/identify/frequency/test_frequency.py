@@ -15,12 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from scipy.linalg import expm
 from scipy.signal import butter, lfilter
 
 import identify
 from benchmarks.second_simulator.two_masses import TwoMasses, multisine, wandering
 from identify.frequency.plant import Banded, loop_of, plant_of
-from identify.frequency.response import LoopSignals, response
+from identify.frequency.response import LoopSignals, Response, response
 from identify.output.as_json import answer_of
 from tests.cli_runs import refusal, twin
 from twin.effects import Catalogue, load_catalogue
@@ -111,6 +112,56 @@ def test_the_margins_are_those_of_the_loop() -> None:
     low, high = found.frequency[falls : falls + 2]
     assert 0.98 * low < told.crossover < 1.02 * high
     assert told.phase_margin == pytest.approx(np.angle(-exact[falls]), abs=0.1)
+
+
+@pytest.mark.parametrize("by_controller", [True, False])
+def test_the_margins_of_a_loop_of_three_poles_are_those_of_its_formula(by_controller: bool) -> None:
+    """L = K/(s (s/a + 1)^2) is 1 at a/2 for K = 0.625 a, and real at a, where it is -K/(2 a)."""
+    corner = 2.0 * np.pi * 20.0
+    s = 2j * np.pi * np.geomspace(1.0, 60.0, 400)
+    loop = 0.625 * corner / (s * (s / corner + 1.0) ** 2)
+    plant, ones = 1.0 / (3.0 * s**2), np.ones(len(s))
+    found = Response(
+        frequency=s.imag / (2.0 * np.pi), plant=plant, spread=1e-9 * ones, noise=0.0 * ones,
+        closed=loop / (1.0 + loop), coherence=ones, band=1e-9 * ones, strength=1e3 * ones,
+        period=1e-3,
+    )  # fmt: skip
+    told = loop_of(found, loop / plant if by_controller else None)
+    assert told is not None
+    assert told.by_controller is by_controller
+    assert told.crossover == pytest.approx(10.0, rel=1e-4)
+    assert np.degrees(told.phase_margin) == pytest.approx(36.87, abs=0.01)
+    assert told.gain_margin == pytest.approx(3.2, rel=0.04)
+    np.testing.assert_allclose(told.sensitivity, 1.0 / (1.0 + loop), rtol=1e-9)
+    assert told.peak == pytest.approx(np.abs(1.0 / (1.0 + loop)).max())
+    low = found.at(found.frequency < 8.0)
+    assert np.isnan(loop_of(low, loop[: len(low.frequency)] / low.plant).crossover)
+
+
+def test_a_mass_on_a_spring_and_damper_is_read_off() -> None:
+    """P(s) = 1/(m s^2 + d s + k), whose samples of a held command are those of its two poles."""
+    mass, damping, stiffness, period = 3.0, 40.0, 2.0e4, 1e-3
+    rates = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0] * 3])
+    step = expm(rates * period)
+    frequency = np.geomspace(2.0, 200.0, 60)
+    turns = np.exp(2j * np.pi * frequency * period)
+    drive = step[:2, 2]
+    plant = np.array([np.linalg.solve(z * np.eye(2) - step[:2, :2], drive)[0] for z in turns])
+    ones = np.ones(len(plant))
+    told = plant_of(
+        Response(
+            frequency=frequency, plant=plant, spread=1e-3 * np.abs(plant), noise=0.0 * ones,
+            closed=np.nan * plant, coherence=ones, band=1e-3 * np.abs(plant), strength=1e3 * ones,
+            period=period,
+        )
+    )  # fmt: skip
+    assert told.modes == ()
+    assert told.mass.value == pytest.approx(mass, rel=1e-3)
+    assert told.damping.value == pytest.approx(damping, rel=1e-2)
+    assert told.stiffness.value == pytest.approx(stiffness, rel=1e-3)
+    assert told.delay.value == pytest.approx(0.0, abs=0.01 * period)
+    np.testing.assert_allclose(told.fitted, plant, rtol=1e-3)
+    assert told.misfit < 0.1
 
 
 def test_where_the_setpoint_makes_none_of_the_force_nothing_is_told() -> None:
