@@ -16,6 +16,7 @@ from twin.experiments.experiment import Experiment, gentle, machine_limits
 from twin.experiments.kinds import (
     KINDS,
     Moves,
+    Multisine,
     OpenLoopSine,
     Passes,
     Rests,
@@ -222,6 +223,33 @@ def test_a_sweep_rises_from_its_lowest_to_its_highest_frequency() -> None:
         made(replace(sweep, amplitude=1.001 * most))
 
 
+def test_a_multisine_is_a_slow_motion_and_sines_of_equal_accelerations() -> None:
+    asked = Multisine("y", period=2.0, repeats=3, span=0.02, lowest=5.0, highest=40.0, phases=1)
+    found = made(asked)
+    samples = round(2.0 * RATE)
+    assert len(found) == 5 * samples
+    y = found.position[:, 1] - MIDDLE[1]
+    np.testing.assert_allclose(found.position[:, 0], MIDDLE[0], rtol=1e-12)
+    periods = y[samples:-samples].reshape(3, samples)
+    np.testing.assert_allclose(periods[1:], periods[:-1], atol=1e-12)
+    lines = np.abs(np.fft.rfft(periods[0])) / (samples / 2)
+    assert lines[1] == pytest.approx(0.5 * 0.02)  # a swing of the span a period
+    sines = lines[10:81] * np.arange(10, 81) ** 2
+    np.testing.assert_allclose(sines, sines[0], rtol=1e-9)
+    assert lines[[0, *range(2, 10), *range(81, 200)]].max() < 1e-9 * lines[10]
+    used = [
+        np.abs(found.velocity[:, 1]).max() / Y.velocity,
+        np.abs(found.acceleration[:, 1]).max() / Y.acceleration,
+        np.abs(np.diff(found.acceleration[:, 1])).max() * RATE / Y.jerk,
+    ]
+    assert 0.85 < max(used) <= 1.0 + 1e-9  # what the slow motion leaves of one limit
+    for end in (0, -1):
+        assert abs(y[end]) < 1e-6
+        assert abs(found.velocity[end, 1]) < 1e-4
+    other = made(replace(asked, phases=2)).position[:, 1]
+    assert np.abs(other - found.position[:, 1]).max() > 1e-5
+
+
 def test_tracking_excites_speeds_reversals_and_travel() -> None:
     found = made(Tracking(60.0), 1)
     for i, axis in enumerate(LIMITS):
@@ -258,7 +286,32 @@ REFUSED = {
     "period": (OpenLoopSine("x", 1.0, period=5e-4), InputError, "at least 0.001 s"),
     "slowest": (Tracking(1.0, slowest=0.22), CannotRun, "axis y, 0.2 m/s"),
     "falling": (Sweep("x", 0.1, 0.05, 1, 1e-6, 80.0, 80.0, effort=0.5), InputError, "rising"),
-    "too high": (Sweep("x", 0.1, 0.05, 1, 1e-9, 4.0, 1e3, effort=0.5), CannotRun, "half the"),
+    "too high": (
+        Sweep("x", 0.1, 0.05, 1, 1e-9, 4.0, 1e3, effort=0.5),
+        CannotRun,
+        "lowest = 4 Hz, highest = 1000 Hz: .* below half the sample rate of 2000 Hz",
+    ),
+    "efforts": (
+        Steps("x", 0.1, 0.02, (0.4, 1.2, 1.1)),
+        InputError,
+        "^efforts = 1.2: give parts of the lim",
+    ),
+    "sines": (
+        Multisine("x", 2.0, 1, 0.01, 40.0, 5.0, 1),
+        InputError,
+        "lowest = 40 Hz, highest = 5 Hz: .* at least 0.5 Hz, below half the sample rate of 2000",
+    ),
+    "fast sines": (Multisine("x", 2.0, 1, 0.01, 1.0, 1e3, 1), InputError, "highest = 1000 Hz"),
+    "slow motion": (
+        Multisine("x", 0.2, 1, 0.1, 10.0, 40.0, 1),
+        CannotRun,
+        "the slow motion alone goes beyond the limits of axis x; give a longer period",
+    ),
+    "other": (
+        Passes("x", 1e-4, 0.001, 1, dwell=0.0, other=0.06),
+        CannotRun,
+        r"other = 0.06 m: one round takes 1\.\d\d s, the experiment lasts 0\.2\d* s; give a small",
+    ),
 }
 
 
