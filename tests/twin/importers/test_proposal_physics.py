@@ -8,7 +8,14 @@ from import_cases import write_csv
 from servo_loop import RATE, loop
 
 from twin.importers.guess import guess_map
-from twin.importers.proposal.courses import columns_of, course, follows
+from twin.importers.proposal.courses import (
+    TableColumn,
+    columns_of,
+    course,
+    distinct,
+    follows,
+    sums,
+)
 from twin.importers.proposal.doubts import doubts_as_metadata
 from twin.importers.proposal.motion import explained
 from twin.logs import AxisLog, Log
@@ -198,3 +205,139 @@ def test_an_imported_log_says_what_its_signals_contradict(changed, said):
     found = "; ".join(doubts_as_metadata(log).values())
     assert said in found
     assert bool(found) is bool(said)
+
+
+# What columns say of each other, of signals that are known exactly
+
+ROWS = np.arange(6000.0)
+WANDERING = np.cumsum(np.cumsum(np.random.default_rng(8).standard_normal(6000)) * 1e-3)
+
+
+def smooth(rows: np.ndarray) -> np.ndarray:
+    """A motion (n,) from rest to rest that is known between its rows too."""
+    waves = np.sin(0.011 * rows) + 0.6 * np.sin(0.0271 * rows + 1.0) + 0.3 * np.cos(0.0437 * rows)
+    return waves * np.exp(-(((rows - 3000.0) / 1000.0) ** 4))
+
+
+def column(values: np.ndarray, name: str = "c") -> TableColumn:
+    return TableColumn(name, values)
+
+
+@pytest.mark.parametrize(
+    ("values", "period"),
+    [
+        (np.mod(7.0 * ROWS, 4096.0), 4096.0),
+        (np.mod(7.0 * ROWS, 128.0), None),
+        (np.mod(0.9 * ROWS, 360.0), 360.0),
+        (np.mod(0.01 * ROWS, 2.0 * np.pi), 2.0 * np.pi),
+        (180.0 + 179.0 * np.sin(0.01 * ROWS), None),
+        (np.mod(0.9 * ROWS, 300.0), None),
+    ],
+)
+def test_what_comes_round_is_known_by_its_jumps(values: np.ndarray, period: float | None) -> None:
+    found = column(values)
+    assert found.wraps == period
+    steps = np.diff(found.smooth)
+    assert bool(np.ptp(steps) < 1e-9) is (period is not None)
+
+
+def test_a_column_is_known_by_its_steps() -> None:
+    rng = np.random.default_rng(3)
+    held = column(np.repeat(rng.standard_normal(2000), 3))
+    assert (held.held, column(rng.standard_normal(6000)).held) == (3, 1)
+    assert column(np.repeat(np.arange(25.0), 3)).held == 1  # too few to be told
+    counter, few = column(np.floor(ROWS / 9.0)), column(np.mod(ROWS, 4.0))
+    assert (counter.counts, counter.whole, counter.rises) == (True, True, True)
+    assert (few.counts, few.whole, few.rises) == (False, True, False)
+    assert not column(0.5 * ROWS).whole
+    assert not column(np.mod(ROWS, 3.0)).whole  # of two steps: a state
+
+
+def test_noise_is_told_from_motion_by_its_size_and_its_kind() -> None:
+    noise = 0.01 * np.random.default_rng(4).standard_normal(6000)
+    size, is_noise = column(smooth(ROWS) + noise).rough(1)
+    # fourth differences of white noise are as large as the root of 1 + 16 + 36 + 16 + 1
+    assert size == pytest.approx(0.01 * np.sqrt(70.0) / np.std(smooth(ROWS)), rel=0.05)
+    assert is_noise
+    size, is_noise = column(smooth(ROWS)).rough(1)
+    assert size < 1e-4
+    assert not is_noise
+
+
+def test_a_rate_is_told_with_its_unit_and_an_offset_makes_it_none() -> None:
+    position = column(smooth(ROWS))
+    middle = 0.5 * (ROWS[1:] + ROWS[:-1])
+    speed = np.append((smooth(middle + 0.5) - smooth(middle - 0.5)), 0.0)
+    how, unit = position.rate(column(-4.0 * speed), 1)
+    assert how == pytest.approx(1.0, abs=1e-6)
+    assert unit == pytest.approx(-0.25, rel=1e-6)
+    assert position.rate(column(speed + 0.1), 1)[0] < 0.5
+    assert position.rate(column(0.0 * ROWS), 1) == (0.0, 0.0)
+    assert position.rate(column(smooth(ROWS)), 1)[0] < 0.1
+
+
+@pytest.mark.parametrize("late", [-7.0, 0.0, 2.5, 31.3])
+@pytest.mark.parametrize("slope", [1.0, -57.3])
+def test_the_course_of_a_column_is_told_with_slope_and_rows_behind(late, slope) -> None:
+    found = course(column(smooth(ROWS - late)), column(slope * smooth(ROWS) + 3.0))
+    assert found is not None
+    assert found.behind == pytest.approx(late, abs=0.02)
+    assert found.slope == pytest.approx(slope, rel=0.01)
+    assert found.likeness > 0.98
+    assert course(column(smooth(ROWS)), column(WANDERING)) is None
+    assert course(column(smooth(ROWS)), column(0.0 * ROWS)) is None
+
+
+def test_sums_and_readings_of_one_thing_are_found_row_by_row() -> None:
+    rng = np.random.default_rng(6)
+    one, two, other = rng.standard_normal((3, 6000))
+    known = columns_of({"one": one, "two": two, "sum": one + two, "again": 2.0 * one})
+    assert [[c.name for c in each] for each in sums(list(known.values())[:3])] == [
+        ["sum", "one", "two"]
+    ]
+    near = columns_of({"one": one, "two": two, "sum": one + two + 1e-2 * other})
+    assert not list(sums(list(near.values())))
+    groups = distinct(list(known.values()))
+    assert [[c.name for c in group] for group in groups] == [["one", "again"], ["two"], ["sum"]]
+
+
+def test_the_parts_of_a_force_are_told_of_a_motion_that_is_known() -> None:
+    rows = ROWS
+    x = smooth(rows)
+    v, a = (np.gradient(x), np.gradient(np.gradient(x)))
+    pull, rub = a / np.std(a), 0.7 * np.sign(v)
+    (found,) = explained(x, [pull + rub])
+    size = np.std(pull + rub)
+    assert found.forward > 0.99
+    assert found.friction == pytest.approx(
+        np.std(rub) / size, rel=0.3
+    )  # less what the place may be
+    assert found.t_inertia > 10.0
+    assert found.accelerates == 1
+    assert found.both_ways
+    (lacking,) = explained(x, [pull - 0.5 * rub])
+    assert lacking.friction < -0.1
+    (turned,) = explained(x, [-3.0 * (pull + rub)])
+    assert turned.inertia == pytest.approx(-found.inertia)
+    assert turned.friction == pytest.approx(-found.friction)
+    assert (turned.forward, turned.backward) == pytest.approx((found.backward, found.forward))
+    assert lacking.pushes
+    assert lacking.is_partial
+    assert not found.pushes
+    (still,) = explained(0.0 * rows, [pull])
+    assert still.best == 0.0
+
+
+@pytest.mark.parametrize(("late", "side"), [(7, "ahead of"), (-7, "behind")])
+@pytest.mark.parametrize("stamped", [True, False])
+def test_a_column_without_a_name_is_told_by_how_far_it_leads(tmp_path, late, side, stamped):
+    x = smooth(ROWS - late)
+    force = 1e4 * np.gradient(np.gradient(x)) + 0.3 * np.sign(np.gradient(x))
+    columns = {"pos_mm": 10.0 * x, "ch7": 10.0 * smooth(ROWS), "force_N": force}
+    clock = {"t": 2e-3 * ROWS} if stamped else {}
+    write_csv(tmp_path / "a.csv", {**clock, **columns})
+    text = guess_map(tmp_path / "a.csv").text
+    lag = "14 ms" if stamped else "7 rows"
+    assert f"goes as the position, {lag} {side} it" in text
+    assert ('setpoint_position = {column = "ch7"' in text) is (late > 0)
+    assert ("a second reading of it" in text) is (late < 0)
