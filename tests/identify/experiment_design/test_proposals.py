@@ -21,7 +21,17 @@ from identify.output.as_json import json_of
 from identify.output.words.next_step import all_not_run_in_words, not_run_in_words
 from twin.errors import CannotRun, InputError
 from twin.experiments.experiment import Experiment
-from twin.experiments.kinds import KINDS, Moves, Passes, Rests, Staircase, Steps, Sweep, Tracking
+from twin.experiments.kinds import (
+    KINDS,
+    Moves,
+    Multisine,
+    Passes,
+    Rests,
+    Staircase,
+    Steps,
+    Sweep,
+    Tracking,
+)
 from twin.experiments.named import ALLOWED
 from twin.model.file import load_model
 from twin.model.machine import AxisModel, Hardware, MachineModel
@@ -67,6 +77,75 @@ def test_proposals_cover_the_sorts_and_last_as_long_as_asked():
     assert any(getattr(e, "other", 0.0) > 0.0 for e in found)
     alone, _ = proposals(MachineModel("s", {"x": PLAIN}, 2000.0), "x", 8.0)
     assert not any(getattr(e, "other", 0.0) for e in alone)
+
+
+@pytest.fixture(scope="module")
+def eight() -> list[Experiment]:
+    """For 8 s of the stage, whose x has 0.24 m, 0.2 m/s, 2 m/s^2 and 100 m/s^3."""
+    found, not_run = proposals(STAGE, "x", 8.0)
+    return [*found, *(n.experiment for n in not_run)]
+
+
+def test_passes_are_slow_fast_and_between_with_the_other_axis_at_rest_and_moving(eight):
+    passes = [e for e in eight if isinstance(e, Passes)]
+    whole = [e for e in passes if e.span == pytest.approx(0.9 * 0.24)]
+    slow, fast = 2.0 * 0.216 / 8.0, 0.2
+    wanted = np.repeat([1.1 * slow, np.sqrt(slow * fast), fast], 2)
+    np.testing.assert_allclose([e.speed for e in whole], wanted, rtol=0.01)
+    np.testing.assert_allclose([e.other for e in whole], [0.0, 0.216] * 3)
+    # ramps of 0.2 m/s take 0.12 s, and a rest at each end 0.1 s
+    assert [e.repeats for e in whole[4:]] == [int(8.0 / (0.216 / 0.2 + 0.12 + 0.1) / 2.0)] * 2
+    *short, still = (e for e in passes if e.span < 0.2)
+    held = np.sqrt(0.02**2 + 2.0 * 0.01) - 0.02  # m/s, over half of 20 mm within 2 m/s^2
+    np.testing.assert_allclose([e.span for e in short], [2e-5, 2e-4, 2e-3, 0.02])
+    np.testing.assert_allclose([e.speed for e in short], [5e-5, 1e-3, 4e-3, held], rtol=0.01)
+    assert not any(e.other for e in short)
+    assert (still.span, still.speed, still.other) == (0.01, 2e-3, 0.216)
+
+
+def test_a_velocity_map_has_ten_speeds_in_equal_ratios(eight):
+    (stairs,) = (e for e in eight if isinstance(e, Staircase))
+    assert stairs.span == pytest.approx(0.3 * 0.216, rel=0.01)
+    assert stairs.longest_plateau in (0.2, 0.1, 0.05)  # a fortieth, halved until it fits
+    ratios = np.divide(stairs.speeds[1:], stairs.speeds[:-1])
+    np.testing.assert_allclose(ratios, (0.2 / 5e-4) ** (1.0 / 9.0), rtol=0.02)
+
+
+def test_rests_grow_in_equal_ratios_and_steps_are_long_and_short(eight):
+    (rests,) = (e for e in eight if isinstance(e, Rests))
+    ratios = np.divide(rests.rests[1:], rests.rests[:-1])
+    np.testing.assert_allclose(ratios, (8.0 / 3.0 / 0.1) ** 0.25, rtol=0.02)
+    steps = [e for e in eight if isinstance(e, Steps)]
+    found = [(round(e.span, 4), round(e.span / e.step)) for e in steps]
+    assert found == [(0.216, 15), (0.216, 3), (0.0648, 15), (0.0648, 3)]  # 60 take too long
+    assert [e.efforts for e in steps] == [(1.0,), (1.0, 0.3), (1.0,), (1.0, 0.3, 1.0)]
+
+
+def test_a_sweep_and_a_multisine_use_a_known_part_of_the_limits(eight):
+    sweeps = [e for e in eight if isinstance(e, Sweep)]
+    assert [(e.lowest, e.highest, e.effort) for e in sweeps] == [
+        (2.0, 60.0, 0.5), (2.0, 120.0, 0.5)
+    ] * 2  # fmt: skip
+    np.testing.assert_allclose([e.span for e in sweeps], [0.216] * 2 + [0.0216] * 2, rtol=0.01)
+    for e in sweeps:
+        assert e.speed == pytest.approx(2.4 * e.span / 8.0, rel=0.01)
+        # half of what half the limits leave: of 2 m/s^2, or of 100 m/s^3 at the highest frequency
+        steepest = min(2.0, 100.0 / (2.0 * np.pi * e.highest))
+        assert e.amplitude == pytest.approx(0.5 * 0.5 * 5.3 * steepest, rel=0.01)
+    (sines,) = (e for e in eight if isinstance(e, Multisine))
+    assert (sines.lowest, sines.highest, sines.repeats) == (2.0, 120.0, 4)
+    assert (sines.period, sines.span) == pytest.approx((8.0 / 6.0, 0.0216), rel=0.01)
+    slow, _ = proposals(replace(STAGE, sample_rate=200.0), "x", 8.0)
+    assert [e.highest for e in slow if isinstance(e, Multisine)] == [80.0]
+
+
+def test_what_takes_too_long_is_told_with_both_times():
+    _, not_run = proposals(STAGE, "x", 1.0)
+    takes = [n.reason for n in not_run if isinstance(n.experiment, Passes)]
+    moves = 2.0 * (0.216 / 0.2 + 0.12) + 3.0 * 0.02  # s, with the shortest rests
+    assert f"takes {moves:.3g} s, more than the 1 s planned; give a longer duration (s)" in takes
+    (other,) = (r for r in dict.fromkeys(takes) if r.startswith("other = 0.216 m: one round takes"))
+    assert f"the experiment lasts {moves:.3g} s" in other
 
 
 TURNED = Hardware((-3.4, 3.4), velocity=90.0, acceleration=2e3, jerk=1e5)  # rad
