@@ -109,3 +109,95 @@ def test_a_parameter_of_which_nothing_varies_has_no_change() -> None:
 
 def test_more_series_need_a_higher_level() -> None:
     assert 4.0 < level_of(5) < level_of(20) <= 5.0
+
+
+def stepped(seed: int = 7, share: float = 0.2, first: int = 40, count: int = 70) -> np.ndarray:
+    """Nights (n,) about 1 that change by a share."""
+    scatter = SCATTER * np.random.default_rng(seed).standard_normal(count)
+    return 1.0 + scatter + share * (np.arange(count) >= first)
+
+
+def width(before: np.ndarray, after: np.ndarray) -> float:
+    """Half the 90 % band of a difference of means, by the scatter of the nights before."""
+    variance = np.var(before, ddof=1)
+    return 1.645 * np.sqrt(variance / len(before) + variance / len(after))
+
+
+@pytest.mark.parametrize("share", [0.2, -0.2])
+def test_the_numbers_of_an_alarm_are_means_of_its_nights_in_its_unit(share: float) -> None:
+    values = FC * stepped(share=share)
+    (alarm,) = alarms_of([panel(values[None])])
+    assert (alarm.changed - date(2026, 1, 1)).days == 40
+    before, after = values[:40], values[-5:]
+    assert alarm.before == pytest.approx(before.mean())
+    assert alarm.after == pytest.approx(after.mean())
+    assert alarm.size == pytest.approx(after.mean() - before.mean())
+    assert alarm.half_width == pytest.approx(width(before, after), rel=1e-3)
+
+
+def test_of_a_force_error_they_are_ratios() -> None:
+    values = 0.003 * np.exp(4.0 * stepped())
+    (alarm,) = alarms_of([panel(values[None], "force_error")])
+    logs = np.log(values)
+    before, after = logs[:40], logs[-5:]
+    assert alarm.before == pytest.approx(np.exp(before.mean()))
+    assert alarm.after == pytest.approx(np.exp(after.mean()))
+    wider = np.exp(after.mean() + width(before, after)) - np.exp(after.mean())
+    assert alarm.half_width == pytest.approx(wider, rel=1e-3)
+
+
+def test_a_trend_is_the_slope_of_the_nights_since_the_change() -> None:
+    values = FC * (stepped(count=80) + 0.01 * np.maximum(np.arange(80) - 40, 0))
+    (alarm,) = alarms_of([panel(values[None])])
+    first = (alarm.changed - date(2026, 1, 1)).days
+    slope = np.polyfit(np.arange(80 - first), values[first:], 1)[0]
+    assert alarm.trend == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_change_of_the_hall_is_told_as_that_of_its_typical_machine() -> None:
+    own = FC * np.array([0.8, 1.3, 0.9, 1.1, 1.05, 1.2, 0.7])
+    common = stepped()
+    (alarm,) = alarms_of([panel(own[:, None] * common)])
+    assert (alarm.scope, alarm.machine) == (Scope.HALL, None)
+    typical = FC * 1.05  # the median
+    assert alarm.before == pytest.approx(typical * common[:40].mean(), rel=1e-6)
+    assert alarm.after == pytest.approx(typical * common[-5:].mean(), rel=1e-6)
+
+
+def test_a_change_is_the_same_in_any_unit_and_in_either_direction() -> None:
+    """Of nights that scatter, some of which are known better than others."""
+    rng = np.random.default_rng(3)
+    deviations = 0.02 * rng.uniform(0.1, 2.0, 90)
+    values = 1.0 + 0.01 * rng.standard_normal(90) + deviations * rng.standard_normal(90)
+    values[50:] += 0.1
+    wanted = changes(values, deviations**2, 0.01, 4.5)
+    assert [c.first in range(45, 56) for c in wanted] == [True]
+    for scale, offset in ((1.0, 7.0), (-1.0, 0.0), (1e3, -2e3)):
+        moved = scale * values + offset
+        found = changes(moved, (scale * deviations) ** 2, abs(scale) * 0.01, 4.5)
+        assert [replace(c, strength=0.0) for c in found] == [
+            replace(c, strength=0.0) for c in wanted
+        ]
+        np.testing.assert_allclose([c.strength for c in found], [c.strength for c in wanted])
+
+
+def test_the_strength_of_a_change_is_students_where_nights_are_independent() -> None:
+    """Over what each side scatters about its mean, with two degrees of freedom less than nights."""
+    rng = np.random.default_rng(11)
+    told, students = [], []
+    for _ in range(40):
+        values = 0.01 * rng.standard_normal(60)
+        values[30:] += 0.05
+        (change,) = changes(values, np.zeros(60), 0.01, 4.5)
+        if change.told > 33 or change.first != 30:
+            continue
+        known = values[: change.told + 11]
+        before, after = known[:30], known[30:]
+        left = np.sum((before - before.mean()) ** 2) + np.sum((after - after.mean()) ** 2)
+        error = np.sqrt(left / (len(known) - 2) * (1.0 / 30 + 1.0 / len(after)))
+        told.append(change.strength)
+        students.append((after.mean() - before.mean() - 0.01) / error)
+    assert len(told) > 20
+    ratios = np.array(told) / students
+    assert ratios.max() <= 1.0 + 1e-9  # alike neighbours make it less sure, never surer
+    assert np.median(ratios) > 0.75
