@@ -11,6 +11,7 @@ import pytest
 from identify.frequency.of_logs import AxisFrequency, Bias, Shown
 from identify.frequency.plant import Banded, Loop, Mode, Plant
 from identify.frequency.response import Response
+from identify.output.as_json import json_of
 from identify.output.printing import to_text  # noqa: F401 - results print themselves
 from identify.output.shown.frequency import read_off
 from identify.results.frequency import FrequencyResponse
@@ -133,3 +134,28 @@ def test_it_says_what_friction_does_to_its_values() -> None:
     )
     least = caution(replace(AXIS, bias=Bias(3.0, None)))
     assert "of the 3.00 kg that least squares with friction find this response shows none" in least
+
+
+def test_its_json_has_the_response_and_what_it_shows_in_the_units_of_the_axis() -> None:
+    modelled = replace(SHOWN, plant=None, loop=None)
+    axes = {"x": replace(AXIS, modelled=modelled), "a": replace(AXIS, units=ROTARY)}
+    told = json_of(FrequencyResponse(("run 1",), axes))
+    assert told["logs"] == ["run 1"]
+    x, a = (told["axes"][name] for name in "xa")
+    assert (x["measured"]["unit"], a["measured"]["unit"]) == ("m/N", "rad/(N m)")
+    shown = x["measured"]
+    assert shown["frequency"] == RESPONSE.frequency.tolist()
+    assert (shown["real"], shown["imaginary"]) == ([0.6] * COUNT, [0.8] * COUNT)
+    assert shown["band_90"] == RESPONSE.band.tolist()
+    assert shown["noise"] == [0.4] * COUNT
+    assert shown["distortion"] == pytest.approx([0.3] * COUNT)  # with the noise it is the spread
+    assert shown["plant"]["mass"] == {"value": 3.1, "band": 0.02}
+    assert (shown["plant"]["mass_unit"], a["measured"]["plant"]["mass_unit"]) == ("kg", "kg m^2")
+    (mode,) = shown["plant"]["modes"]
+    assert mode["gain"] == {"value": 0.5, "band": 0.1}
+    assert shown["loop"]["phase_margin"] == pytest.approx(0.25 * pi)
+    assert x["modelled"]["plant"] is x["modelled"]["loop"] is None
+    assert a["modelled"] is None
+    assert x["bias"] is None
+    biased = json_of(FrequencyResponse(("r",), {"x": replace(AXIS, bias=Bias(3.0, None))}))
+    assert biased["axes"]["x"]["bias"] == {"own": 3.0, "back": None}
