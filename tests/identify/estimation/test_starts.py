@@ -182,3 +182,41 @@ def test_a_shape_is_sought_anew_where_error_is_left_and_nowhere_else():
     quiet = fit_multistart(found.axis, dataset, begun=begun)
     assert quiet.error == pytest.approx(found.error, rel=1e-3)
     assert quiet.begun is begun
+
+
+def bounded(name: str, **bounds: tuple[float, float, float]):
+    """The effect with other starts and bounds of its strengths."""
+    effect = CATALOGUE[name]
+    parameters = tuple(
+        replace(p, start=bounds[p.name][0], lower=bounds[p.name][1], upper=bounds[p.name][2])
+        if p.name in bounds
+        else p
+        for p in effect.parameters
+    )
+    return replace(effect, parameters=parameters)
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.03, -0.03])
+@pytest.mark.parametrize("truth", [0.5, -0.5, 0.04])
+def test_a_strength_is_the_best_within_its_bounds_wherever_it_begins(begin, truth):
+    """The least squares of one strength within bounds are the free ones, clipped."""
+    dataset = planted("constant_force", F0=truth)
+    base = fit_axis(PLAIN, dataset.training)
+    narrow = bounded("constant_force", F0=(begin, -0.06, 0.08))
+    (free, *_), (found, *_) = (
+        starts(base, dataset, e) for e in (CATALOGUE["constant_force"], narrow)
+    )
+    best = free.fitted.values["F0"]
+    assert best == pytest.approx(truth, abs=0.01)
+    assert found.fitted.values["F0"] == pytest.approx(np.clip(best, -0.06, 0.08), rel=1e-3)
+    if not -0.06 < best < 0.08:
+        assert found.squared_error > free.squared_error
+
+
+def test_of_several_strengths_each_stays_within_its_bounds():
+    dataset = planted("spring", k1=20.0, k2=60.0, offset=0.0, k3=0.0, middle=0.0)
+    base = fit_axis(PLAIN, dataset.training)
+    narrow = bounded("spring", k1=(5.0, -1.0, 8.0), k2=(-9.0, -10.0, 30.0))
+    found = starts(base, dataset, narrow)[0].fitted.values
+    assert found["k1"] == pytest.approx(8.0, rel=1e-3)
+    assert found["k2"] == pytest.approx(30.0, rel=1e-3)
