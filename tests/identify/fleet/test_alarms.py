@@ -201,3 +201,17 @@ def test_the_strength_of_a_change_is_students_where_nights_are_independent() -> 
     ratios = np.array(told) / students
     assert ratios.max() <= 1.0 + 1e-9  # alike neighbours make it less sure, never surer
     assert np.median(ratios) > 0.75
+
+
+@pytest.mark.parametrize("night", [0, 20])
+def test_a_night_that_is_hardly_known_changes_no_verdict(night: int) -> None:
+    """What it is off by is within its own interval, and tells nothing of how the others scatter."""
+    rng = np.random.default_rng(2)
+    values, deviations = 1.0 + 0.01 * rng.standard_normal(60), np.full(60, 1e-4)
+    values[40:] += 0.05
+    (wanted,) = changes(np.delete(values, night), np.delete(deviations, night) ** 2, 0.01, 4.5)
+    values[night] += 1.0
+    deviations[night] = 1.0
+    (found,) = changes(values, deviations**2, 0.01, 4.5)
+    assert (found.first, found.told) == (wanted.first + 1, wanted.told + 1)
+    assert found.strength == pytest.approx(wanted.strength, rel=0.05)
