@@ -323,3 +323,18 @@ def test_the_strongest_line_has_its_frequency_and_its_share_of_the_variance(heig
     true = np.mean(sine**2) / np.mean((sine + noise) ** 2)
     assert frequency == pytest.approx(137.0, abs=1.5)
     assert true / 2.0 < share + 1e-3 < 1.5 * true + 2e-3
+
+
+def test_the_velocity_without_the_encoders_own_periods_is_that_of_the_motion():
+    rate, period = 4000.0, 2e-3
+    t = np.arange(12_000) / rate
+    x = waves((0.03, 1.3, 0.4), (0.004, 3.1, 1.0))(t)
+    error = 1.5e-6 * np.sin(2.0 * np.pi * x / period + 0.7)
+    log = log_of(rate, x + error, 3.0 * np.sin(9.0 * t))
+    motion = motion_of(log, "x", "run", ripples=(period,))
+    true = (np.diff(x) * rate)[motion.left_out :][: len(motion.unrippled)]
+    of_error = np.std(np.diff(error)) * rate
+    assert np.std(motion.raw[0] - true) == pytest.approx(of_error, rel=0.05)
+    assert np.std(motion.unrippled - true) < 0.1 * of_error
+    plain = replace(motion, ripples=())
+    np.testing.assert_array_equal(plain.unrippled, motion.raw[0])
