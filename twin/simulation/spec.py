@@ -174,7 +174,6 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
     spec.option.timestep = model.period
     # Higher-order integrators evaluate the forces within a sample, where states do not advance.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    carried: dict[str, float] = {}
     for name in reversed(list(model.axes)):
         joint, motor = spec.joint(name), spec.actuator(f"motor_{name}")
         if joint is None or motor is None:
@@ -184,16 +183,9 @@ def machine_spec(model: MachineModel) -> mujoco.MjSpec:
             )
         _require_bare(model, name, joint, motor)
         if model.axes[name].rotary:
-            carried[name] = _set_inertia(model, spec, name)
-            continue
-        inside = sum(m for other, m in carried.items() if _carries(joint.parent, other))
-        moved = model.axes[name].weighed.mass
-        if moved - inside <= 0:
-            raise InputError(
-                f"axis {name}: mass {moved:g} kg is not above the {inside:g} kg of "
-                "the axis that it carries; give the whole moved mass"
-            )
-        joint.parent.mass = carried[name] = moved - inside
+            _set_inertia(model, spec, name)
+        else:
+            _set_mass(model, spec, name)
     for name, axis in model.axes.items():
         for f in axis.effects:
             if f.effect.attach is not None and f.effect.is_present(f.values):
@@ -213,8 +205,27 @@ def attached_joint(axis: str, effect: str) -> str:
     return f"{effect}_{axis}"
 
 
-def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
-    """Give the body of a rotary axis its moment of inertia about the hinge; its mass, kg."""
+def _set_mass(model: MachineModel, spec: mujoco.MjSpec, name: str) -> None:
+    """Give the body of a linear axis what is left of the moved mass beside all that it carries."""
+    body, moved = spec.joint(name).parent, model.axes[name].weighed.mass
+    if not body.explicitinertial and not body.geoms:
+        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+    made = spec.compile()
+    own = made.body(body.id)
+    inside = float(made.body_subtreemass[body.id] - own.mass[0])
+    if moved - inside <= 0:
+        raise InputError(
+            f"axis {name}: mass {moved:g} kg is not above the {inside:g} kg of what it carries; "
+            "give the whole moved mass"
+        )
+    if not body.explicitinertial:  # a mass of geoms would be made of them anew
+        body.ipos, body.iquat, body.inertia = own.ipos, own.iquat, own.inertia
+        body.explicitinertial = True
+    body.mass = moved - inside
+
+
+def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> None:
+    """Give the body of a rotary axis its moment of inertia about the hinge; it keeps its mass."""
     axis, joint = model.axes[name], spec.joint(name)
     for other in model.axes:
         if _carries(joint.parent, other):
@@ -226,7 +237,6 @@ def _set_inertia(model: MachineModel, spec: mujoco.MjSpec, name: str) -> float:
     body = joint.parent
     body.mass, body.ipos, body.explicitinertial = mass, joint.pos, True
     body.inertia = [axis.weighed.mass] * 3
-    return mass
 
 
 def _require_bare(

@@ -62,6 +62,18 @@ def test_an_axis_that_carries_another_moves_both_masses() -> None:
     assert made.opt.timestep == 1e-4
 
 
+def test_the_mass_is_the_models_where_the_file_has_it_by_geoms() -> None:
+    """The geoms' mass was kept: 1 kg in place of 9, and MuJoCo's motion was another machine's."""
+    inertial, geom = '<inertial pos="0 0 0" mass="1"', '<geom type="box" size="1 1 1" mass="1"'
+    file = STACKED.replace(inertial + ' diaginertia="1 1 1"', geom)
+    tool = file.replace("</body>", '<body name="tool"><geom size="0.1" mass="2"/></body></body>', 1)
+    for mjcf, upper in ((file, 6.0), (tool, 4.0)):
+        made = built(replace(STAGE, mjcf=mjcf))
+        assert made.body("upper").mass[0] == pytest.approx(upper)
+        assert made.body("lower").mass[0] == pytest.approx(9.0)
+        assert made.body_subtreemass[made.body("lower").id] == pytest.approx(15.0)
+
+
 def test_a_rotary_axis_has_its_inertia_about_its_hinge_and_the_mass_of_the_file() -> None:
     disc = MachineModel("d", {"a": AxisModel(0.3, rotary=True)}, mjcf=ROTARY_FILE, mjcf_name="d")
     made = built(disc)
@@ -120,8 +132,7 @@ STANDING = {"frequency": 8.0, "damping": 0.05}
         ),
         (
             replace(STAGE, axes={"x": AxisModel(5.0), "y": AxisModel(6.0)}),
-            "axis x: mass 5 kg is not above the 6 kg of the axis that it carries; give the whole "
-            "moved mass",
+            "axis x: mass 5 kg is not above the 6 kg of what it carries; give the whole moved mass",
         ),
         (
             replace(STAGE, mjcf=STACKED.replace('joint="x" gear="1"', 'joint="x" gear="2.5"')),
