@@ -1,12 +1,14 @@
 """Tables of measurements for the tests of the importers, and maps that fit them."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
 from twin.importers import ImportMap, load_mapping
+from twin.importers.guess import propose
 
 RATE = 2000.0
 COUNT = 300
@@ -49,6 +51,19 @@ def mapping(folder: Path, text: str = MAP) -> ImportMap:
     path = folder / "map.toml"
     path.write_text(text, encoding="utf-8")
     return load_mapping(path)
+
+
+class Guess(NamedTuple):
+    """A proposed map to which the user has added nothing: its text, and what it lacks."""
+
+    text: str
+    missing: tuple[str, ...]
+
+
+def guess_map(path: Path) -> Guess:
+    """What is proposed for a file."""
+    found = propose(path)
+    return Guess(found.map_text({}), found.lacks({}))
 
 
 def write_csv(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",") -> None:

@@ -15,7 +15,7 @@ from benchmarks.door.recordings import draw
 from benchmarks.door.verdict import Verdict, judge
 from benchmarks.figures import Figure, Target, report
 from twin.errors import InputError
-from twin.importers.guess import guess_map
+from twin.importers.guess import propose
 
 TITLE = "The door: maps proposed for recordings of other recorders"
 FILES, SEED = 40, 9
@@ -36,7 +36,7 @@ def judged(folder: Path, files: int, seed: int) -> list[Verdict]:
         recording = draw(folder, seed, number)
         begun = perf_counter()
         try:
-            text = guess_map(recording.path).text
+            text = propose(recording.path).map_text({})
         except InputError as error:
             out.append(Verdict(recording, missed=[f"not read: {error}"]))
             continue
@@ -66,7 +66,7 @@ def _long(folder: Path) -> Figure:
     path = folder / "long.csv"
     np.savetxt(path, table, delimiter=",", header="t,pos,pos_cmd,force", comments="", fmt="%.7g")
     begun = perf_counter()
-    guess_map(path)
+    propose(path).map_text({})
     seconds = perf_counter() - begun
     return Figure("a map for a million rows", seconds, "s", Target(high=3.0))
 

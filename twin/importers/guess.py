@@ -6,7 +6,6 @@ Which columns are which signals of an axis is told by their names and by the phy
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,17 +39,7 @@ from twin.importers.units import find_unit, is_unit
 from twin.logs.container import reading
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS, Array
 
-Columns = Mapping[str, Array]
-
 _KINDS = tuple(dict.fromkeys((*LINEAR_UNITS.values(), *ROTARY_UNITS.values())))
-
-
-@dataclass(frozen=True)
-class Guess:
-    """text: of the map; missing: what the user must add, one sentence each."""
-
-    text: str
-    missing: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -134,12 +123,6 @@ class Proposal:
         )  # fmt: skip
 
 
-def guess_map(path: Path) -> Guess:
-    """A map for a file of any of the formats; raises InputError where it has no columns."""
-    found = propose(path)
-    return Guess(found.map_text({}), found.lacks({}))
-
-
 def propose(path: Path) -> Proposal:
     """What is proposed for a file of any of the formats; raises InputError without a column."""
     with reading(path):
@@ -212,11 +195,6 @@ def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
             out[name] = column
     longest = max((len(c) for c in out.values()), default=0)
     return {name: column for name, column in out.items() if len(column) == longest}, holes
-
-
-def _table(name: str, unit: str | None) -> str:
-    column, text = (json.dumps(value, ensure_ascii=False) for value in (name, unit))
-    return f"{{column = {column}, unit = {text}}}"
 
 
 def doubts_of(mapping: ImportMap) -> Iterator[str]:

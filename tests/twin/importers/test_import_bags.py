@@ -9,12 +9,11 @@ from pathlib import Path
 import cli_runs
 import numpy as np
 import pytest
-from import_cases import map_of, mapping
+from import_cases import guess_map, map_of, mapping
 from mcap.writer import CompressionType, Writer
 
 from twin.errors import InputError
 from twin.importers import import_log, import_notes
-from twin.importers.guess import guess_map
 from twin.logs import Log, recover_file
 
 COUNT = 1500

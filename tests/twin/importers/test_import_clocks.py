@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from import_cases import MAP as PLAIN
-from import_cases import map_of, mapping, write_csv
+from import_cases import guess_map, map_of, mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log, import_notes
-from twin.importers.guess import guess_map
 from twin.logs import Log
 
 MAP = "resample = 1000.0\n" + map_of("q", "f", clock="t in s")

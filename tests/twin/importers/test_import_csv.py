@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import COUNT, MAP, mapping, table
+from import_cases import COUNT, MAP, guess_map, mapping, table
 
 from twin.errors import InputError
 from twin.importers import import_log, import_notes
-from twin.importers.guess import guess_map
 from twin.logs import Log
 
 

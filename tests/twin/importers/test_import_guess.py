@@ -8,14 +8,13 @@ from pathlib import Path
 import cli_runs
 import numpy as np
 import pytest
-from import_cases import mapping, write_csv
+from import_cases import guess_map, mapping, write_csv
 from scipy.io import savemat
 
 from twin.checks import Fault, check_log
 from twin.checks.content import assumptions
 from twin.errors import InputError
 from twin.importers import import_log
-from twin.importers.guess import guess_map
 from twin.logs import read_log, write_log
 from twin.model.file import save_model
 from twin.model.machine import AxisModel, MachineModel

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from import_cases import map_of, mapping, write_csv
+from import_cases import guess_map, map_of, mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log, import_notes
-from twin.importers.guess import guess_map
 from twin.importers.stated_rate import stated_rate
 from twin.logs import Log
 

@@ -4,10 +4,9 @@ import tomllib
 
 import numpy as np
 import pytest
-from import_cases import write_csv
+from import_cases import guess_map, write_csv
 from servo_loop import RATE, loop
 
-from twin.importers.guess import guess_map
 from twin.importers.proposal.courses import (
     TableColumn,
     columns_of,
