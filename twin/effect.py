@@ -21,7 +21,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -232,39 +232,33 @@ class Effect:
                 f"the law of an effect is defined in {self.name}, whose name is no name of an "
                 "effect; write it to a Python file of its own, such as my_effect.py"
             )
+        for fault in self._faults():
+            raise ValueError(f"effect {self.name}: {fault}")
+
+    def _faults(self) -> Iterator[str]:
+        """What of the declaration makes no sense."""
         if not isinstance(self.kind, Kind):
             kinds = ", ".join(f"Kind.{kind.name}" for kind in Kind)
-            raise ValueError(f"effect {self.name}: its kind is {self.kind!r}; give one of {kinds}")
+            yield f"its kind is {self.kind!r}; give one of {kinds}"
         names = [p.name for p in self.parameters]
         if len(set(names)) != len(names):
-            raise ValueError(f"effect {self.name}: a parameter name is used twice")
+            yield "a parameter name is used twice"
         for p in self.parameters:
+            bounds = f"its bounds [{p.lower}, {p.upper}]"
             if not isinstance(p.unit, str):
-                raise ValueError(
-                    f"effect {self.name}: the unit of {p.name} is {p.unit}; give a text such as 'N'"
-                )
+                yield f"the unit of {p.name} is {p.unit}; give a text such as 'N'"
             if not p.unit:
-                raise ValueError(
-                    f"effect {self.name}: parameter {p.name} has no unit; use '1' for a ratio"
-                )
+                yield f"parameter {p.name} has no unit; use '1' for a ratio"
             if not p.lower <= p.start <= p.upper:
-                raise ValueError(
-                    f"effect {self.name}: start {p.start} {p.unit} of {p.name} is outside its "
-                    f"bounds [{p.lower}, {p.upper}]"
-                )
+                yield f"start {p.start} {p.unit} of {p.name} is outside {bounds}"
             if p.strength and not p.lower <= 0.0 <= p.upper:
-                raise ValueError(
-                    f"effect {self.name}: strength {p.name} cannot be zero within its bounds "
-                    f"[{p.lower}, {p.upper}] {p.unit}"
-                )
+                yield f"strength {p.name} cannot be zero within {bounds} {p.unit}"
             if p.at_least is not None and p.at_least not in names:
-                raise ValueError(f"effect {self.name}: {p.name} refers to unknown {p.at_least}")
+                yield f"{p.name} refers to unknown {p.at_least}"
         held = {p.name for p in self.parameters if p.fixed}
         for bend in (c.bent_by for c in self.curves if c.bent_by):
             if bend not in held:
-                raise ValueError(
-                    f"effect {self.name}: its curve is bent by {bend}, which is no fixed parameter"
-                )
+                yield f"its curve is bent by {bend}, which is no fixed parameter"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """An effect is its file, a number and a size; what is written are functions."""
