@@ -1,7 +1,7 @@
 """The entries of a user's TOML file, checked against a schema; a mistake is one line.
 
-The description of a field says what may be given: it is the end of the error, and what an editor
-shows that has the JSON schema.
+The description of a field, or the docstring below it, says what may be given: it is the end of the
+error, and what an editor shows that has the JSON schema.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ NAME_OF_TABLE = "[key]"  # where the library found fault with the name and not w
 class Entries(BaseModel):
     """A table of a TOML file; every entry must be known, and of the type that it is shown with."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 Kind = TypeVar("Kind", bound=Entries)

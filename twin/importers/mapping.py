@@ -38,13 +38,13 @@ from twin.logs.container import reading
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
 from twin.logs.topics import IDENTIFIER
 
-NUMBER = "a finite number"
 PER_ENCODER = ("counts_per_turn", "counts_per_metre")
 AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
 
 
 class _Column(Entries):
-    column: str | int = Field(description="a name, or a number where there are no names")
+    column: str | int
+    """a name, or a number where there are no names"""
 
     @property
     def name(self) -> str:
@@ -55,12 +55,10 @@ class _Column(Entries):
 class TimeMap(_Column):
     """The column of the time stamps, or of a counter of the samples."""
 
-    unit: str | None = Field(
-        None, description='a unit of time in quotes, such as "s", "ms" or "us"; or step'
-    )
-    step: float | None = Field(
-        None, gt=0.0, description="a number above 0: s for one, of a column that counts the samples"
-    )
+    unit: str | None = None
+    """a unit of time in quotes, such as "s", "ms" or "us"; or step"""
+    step: float | None = Field(None, gt=0.0)
+    """a number above 0: s for one, of a column that counts the samples"""
 
     @property
     def seconds(self) -> float:
@@ -78,32 +76,25 @@ class ColumnMap(_Column):
     """The column of a signal: SI value = sign x (scale x raw + offset) x unit."""
 
     unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
-    scale: float | str = Field(
-        1.0, description=NUMBER + " other than 0: SI units a raw one; or a scalar of the file"
-    )
-    offset: float = Field(0.0, description=NUMBER + ", in the unit; in SI where a scale brings it")
-    sign: Literal[1, -1] = Field(1, description="1 or -1")
-    delay_samples: int = Field(
-        0, ge=-(10**6), le=10**6,
-        description="a whole number, -1000000 to 1000000: by how many samples the column was "
-        "recorded too late",
-    )  # fmt: skip
-    counts_per_turn: float | None = Field(
-        None, gt=0.0, description="a number above 0: counts of the encoder in one turn"
-    )
-    counts_per_metre: float | None = Field(
-        None, gt=0.0, description="a number above 0: counts of the encoder in one metre"
-    )
-    wraps: float | None = Field(
-        None, gt=0.0,
-        description="a number above 0: counts after which the counter begins again, such as 65536",
-    )  # fmt: skip
+    scale: float | str = 1.0
+    """a finite number other than 0: SI units a raw one; or a scalar of the file"""
+    offset: float = 0.0
+    """a finite number, in the unit; in SI where a scale brings it"""
+    sign: Literal[1, -1] = 1
+    """1 or -1"""
+    delay_samples: int = Field(0, ge=-(10**6), le=10**6)
+    """a whole number, -1000000 to 1000000: by how many samples the column was recorded too late"""
+    counts_per_turn: float | None = Field(None, gt=0.0)
+    """a number above 0: counts of the encoder in one turn"""
+    counts_per_metre: float | None = Field(None, gt=0.0)
+    """a number above 0: counts of the encoder in one metre"""
+    wraps: float | None = Field(None, gt=0.0)
+    """a number above 0: counts after which the counter begins again, such as 65536"""
     side: Literal["motor", "load"] | None = Field(
         None, description='"motor" or "load": on which side of the gear it is measured'
     )
-    file: int = Field(
-        1, ge=1, le=1000, description="a whole number: which of several files, the first is 1"
-    )
+    file: int = Field(1, ge=1, le=1000)
+    """a whole number: which of several files, the first is 1"""
     _si: Unit = PrivateAttr(Unit(1.0, None))
 
     @property
@@ -173,9 +164,8 @@ _SIGNAL: Any = Field(None, description='a table such as {column = "name in the f
 class AxisMap(Entries):
     """Signals of one axis; force_constant in N/A (N m/A on a rotary axis) or None."""
 
-    force_constant: float | None = Field(
-        None, gt=0.0, description="a number above 0, in N/A (N m/A on a rotary axis)"
-    )
+    force_constant: float | None = Field(None, gt=0.0)
+    """a number above 0, in N/A (N m/A on a rotary axis)"""
     gear: float | dict[str, float] | None = Field(
         None,
         description="turns of this axis' motor, whose signals are mapped, for one of the load: a "
@@ -187,12 +177,10 @@ class AxisMap(Entries):
         description='"motor" or "load": on which side of the gear position and velocity are '
         "measured; current and force are the motor's, unless a column says its own side",
     )
-    counts_per_turn: float | None = Field(
-        None, gt=0.0, description="a number above 0: of each signal in counts that has none itself"
-    )
-    counts_per_metre: float | None = Field(
-        None, gt=0.0, description="a number above 0: of each signal in counts that has none itself"
-    )
+    counts_per_turn: float | None = Field(None, gt=0.0)
+    """a number above 0: of each signal in counts that has none itself"""
+    counts_per_metre: float | None = Field(None, gt=0.0)
+    """a number above 0: of each signal in counts that has none itself"""
     setpoint_position: ColumnMap | None = _SIGNAL
     setpoint_velocity: ColumnMap | None = _SIGNAL
     setpoint_acceleration: ColumnMap | None = _SIGNAL
@@ -278,42 +266,36 @@ class AxisMap(Entries):
 
 class _File(Entries):
     format: str | None = Field(None, description='a format in quotes, such as "csv"')
-    sample_rate: float | None = Field(None, gt=0.0, description=NUMBER + " above 0, in Hz")
-    time: TimeMap | None = Field(None, description='a table such as {column = "t", unit = "s"}')
-    rows: list[Annotated[int, Field(ge=1)]] | None = Field(
-        None, min_length=2, max_length=2,
-        description="the first and the last row to take, such as [13, 5000]; rows count from 1",
-    )  # fmt: skip
+    sample_rate: float | None = Field(None, gt=0.0)
+    """a finite number above 0, in Hz"""
+    time: TimeMap | None = None
+    """a table such as {column = "t", unit = "s"}"""
+    rows: list[Annotated[int, Field(ge=1)]] | None = Field(None, min_length=2, max_length=2)
+    """the first and the last row to take, such as [13, 5000]; rows count from 1"""
 
 
 class FileMap(_File):
     """One of several files that are given together, in their order."""
 
-    offset: float = Field(0.0, description=NUMBER + ", in s, which is added to its times")
+    offset: float = 0.0
+    """a finite number, in s, which is added to its times"""
 
 
 class ImportMap(_File):
     """A whole map; at most one of sample_rate and time."""
 
-    resample: float | None = Field(
-        None,
-        gt=0.0,
-        description="a number above 0, in Hz: uneven time stamps are brought onto this clock",
-    )
-    files: list[FileMap] | None = Field(
-        None, min_length=2, description="tables [[files]], one for each file; resample brings "
-        "their columns onto one clock",
-    )  # fmt: skip
-    delimiter: str | None = Field(
-        None, min_length=1, max_length=1, description="one character, such as ';'"
-    )
-    decimal: Literal[".", ","] | None = Field(None, description="'.' or ','")
-    header_line: int | None = Field(None, ge=1, description="a whole number; lines count from 1")
-    axes: dict[Annotated[str, Field(pattern=AXIS_NAME)], AxisMap] = Field(
-        min_length=1,
-        description="a table for each axis, as [axes.x]; an axis name has letters, digits and "
-        "underscores",
-    )  # fmt: skip
+    resample: float | None = Field(None, gt=0.0)
+    """a number above 0, in Hz: uneven time stamps are brought onto this clock"""
+    files: list[FileMap] | None = Field(None, min_length=2)
+    """tables [[files]], one for each file; resample brings their columns onto one clock"""
+    delimiter: str | None = Field(None, min_length=1, max_length=1)
+    """one character, such as ';'"""
+    decimal: Literal[".", ","] | None = None
+    """'.' or ','"""
+    header_line: int | None = Field(None, ge=1)
+    """a whole number; lines count from 1"""
+    axes: dict[Annotated[str, Field(pattern=AXIS_NAME)], AxisMap] = Field(min_length=1)
+    """a table for each axis, as [axes.x]; an axis name has letters, digits and underscores"""
     _text: str = PrivateAttr("")
 
     @property

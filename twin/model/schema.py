@@ -80,9 +80,8 @@ class EffectTable(Entries):
 
     model_config = ConfigDict(extra="allow")
 
-    fixed: list[str] | None = Field(
-        None, description='a list of names of parameters, such as ["pitch"], that a fit holds'
-    )
+    fixed: list[str] | None = None
+    """a list of names of parameters, such as ["pitch"], that a fit holds"""
 
 
 @_with_hardware
@@ -96,9 +95,8 @@ class _MovedEntry(Entries):
         description="the name of a hinge or slide joint of the MJCF or URDF file, or of a fixed "
         "tendon, whose bodies the axis moves, in place of a mass or inertia",
     )  # fmt: skip
-    fixed: list[Name] | None = Field(
-        None, description='["mass"] (["inertia"] on a rotary axis), where a fit holds it'
-    )
+    fixed: list[Name] | None = None
+    """["mass"] (["inertia"] on a rotary axis), where a fit holds it"""
 
 
 class AxisEntry(_MovedEntry):
@@ -110,9 +108,8 @@ class AxisEntry(_MovedEntry):
     channel_delay: float | None = _quantity(
         "s", "by which the force is stamped later than it acts", zero=True, most=1.0
     )
-    effects: dict[str, EffectTable] = Field(
-        {}, description="a table for each effect, as in [axes.x.effects.cogging]"
-    )
+    effects: dict[str, EffectTable] = Field({})
+    """a table for each effect, as in [axes.x.effects.cogging]"""
 
 
 class HistoryEntry(Entries):
@@ -141,25 +138,18 @@ class HistoryEntry(Entries):
 class ModelFile(Entries):
     """A whole machine model."""
 
-    name: str | None = Field(
-        None, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$",
-        description="a text of up to 200 characters on one line",
-    )  # fmt: skip
-    mujoco: str | None = Field(
-        None, pattern=r"^[^/\\\x00]+$",
-        description="the name of an MJCF or URDF file that is beside this one, without folders",
-    )  # fmt: skip
-    sample_rate: float = Field(
-        10_000.0, gt=0.0, le=1e7, description="a number above 0, at most 1e+07, in Hz"
-    )
+    name: str | None = Field(None, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")
+    """a text of up to 200 characters on one line"""
+    mujoco: str | None = Field(None, pattern=r"^[^/\\\x00]+$")
+    """the name of an MJCF or URDF file that is beside this one, without folders"""
+    sample_rate: float = Field(10_000.0, gt=0.0, le=1e7)
+    """a number above 0, at most 1e+07, in Hz"""
     axes: dict[Annotated[str, Field(pattern=AXIS_NAME, max_length=40)], AxisEntry] = Field(
-        min_length=1, max_length=MOST_AXES,
-        description="a table for each of 1 to 64 axes, as [axes.x]; a name has letters, digits "
-        "and underscores",
-    )  # fmt: skip
-    intervals: dict[str, dict[str, Pair | Ratio]] = Field(
-        {}, description="two finite numbers, low and high, by axis and parameter, from the last fit"
+        min_length=1, max_length=MOST_AXES
     )
+    """a table for each of 1 to 64 axes, as [axes.x]; a name has letters, digits and underscores"""
+    intervals: dict[str, dict[str, Pair | Ratio]] = Field({})
+    """two finite numbers, low and high, by axis and parameter, from the last fit"""
     history: list[HistoryEntry] = Field([], description="the model's growth, as [[history]]")
 
 
