@@ -112,21 +112,24 @@ class Server:
 
     async def proposal(self, request: Request) -> Response:
         """What the columns of a file are taken for: `twin import FILE --guess --json`."""
-        name = request.query_params.get("file", "")
-        path = inside(self.folder.root, name)
-        stamp = path.stat().st_mtime_ns if path.is_file() else None
-        return JSONResponse(await self._answer(stamp, "import", name, "--guess"))
+        return JSONResponse(await self._answer_about(request, "import", "--guess"))
 
     async def signals(self, request: Request) -> Response:
         """What is in a log, with the course of each signal: `twin info LOG --json`."""
-        name = request.query_params.get("file", "")
-        path = inside(self.folder.root, name)
-        stamp = path.stat().st_mtime_ns if path.is_file() else None
-        return JSONResponse(await self._answer(stamp, "info", name))
+        return JSONResponse(await self._answer_about(request, "info"))
 
     async def effects(self, request: Request) -> Response:
         """The catalogue: `twin effects --json`."""
         return JSONResponse(await self._answer(None, "effects"))
+
+    async def _answer_about(
+        self, request: Request, command: str, *options: str
+    ) -> Mapping[str, Any]:
+        """The answer of a command about a file of the project, asked anew when that has changed."""
+        name = request.query_params.get("file", "")
+        path = inside(self.folder.root, name)
+        stamp = path.stat().st_mtime_ns if path.is_file() else None
+        return await self._answer(stamp, command, name, *options)
 
     async def _answer(self, stamp: object, *words: str) -> Mapping[str, Any]:
         """The answer of a command that changes nothing, asked once."""

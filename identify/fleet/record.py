@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -139,12 +140,14 @@ def _known(task: Task) -> tuple[dict[str, Any], str, tuple[Origin, Machine] | Re
     version = software_version()
     origin: Origin | None = None
     machine: Machine | None = None
-    refused: Refused | None = None
+    found: tuple[Origin, Machine] | Refused
     try:
         origin = _origin(task)
-        machine = _machine(task, origin)
+        with _refusing(LogFault.NO_MODEL):
+            machine = task.models.of(origin.machine)
+        found = origin, machine
     except Refused as error:
-        refused = error
+        found = error
     model = machine.digest if machine else task.models.digest
     parts = (task.digest, model, version, origin.axis if origin else None)
     key = hashlib.sha256(repr(parts).encode()).hexdigest()
@@ -155,30 +158,24 @@ def _known(task: Task) -> tuple[dict[str, Any], str, tuple[Origin, Machine] | Re
         "machine": origin.machine if origin else None,
         "started": origin.started if origin else None, "night": origin.night if origin else None,
     }  # fmt: skip
-    if refused is not None:
-        return about, key, refused
-    assert origin is not None
-    assert machine is not None
-    return about, key, (origin, machine)
+    return about, key, found
+
+
+@contextmanager
+def _refusing(fault: LogFault, place: str = "") -> Iterator[None]:
+    """What cannot be used within keeps the log from being fitted; place: begins the error."""
+    try:
+        yield
+    except InputError as error:
+        raise Refused(fault, f"{place}{error}") from error
 
 
 def _origin(task: Task) -> Origin:
     by_path = task.pattern.read(task.name) if task.pattern else {}
-    try:
+    with _refusing(LogFault.UNREADABLE):
         told = log_metadata(task.path)
-    except InputError as error:
-        raise Refused(LogFault.UNREADABLE, str(error)) from error
-    try:
+    with _refusing(LogFault.UNNAMED, f"{task.name}: "):
         return origin_of(told, by_path)
-    except InputError as error:
-        raise Refused(LogFault.UNNAMED, f"{task.name}: {error}") from error
-
-
-def _machine(task: Task, origin: Origin) -> Machine:
-    try:
-        return task.models.of(origin.machine)
-    except InputError as error:
-        raise Refused(LogFault.NO_MODEL, str(error)) from error
 
 
 def _rows(task: Task, found: tuple[Origin, Machine] | Refused) -> tuple[list[Row], str]:
@@ -199,10 +196,8 @@ def _rows(task: Task, found: tuple[Origin, Machine] | Refused) -> tuple[list[Row
 
 
 def _read(task: Task, origin: Origin) -> tuple[Log, CheckReport]:
-    try:
+    with _refusing(LogFault.UNREADABLE):
         log, report = read_checked(task.path, SIGNALS)
-    except InputError as error:
-        raise Refused(LogFault.UNREADABLE, str(error)) from error
     if origin.axis is None:
         return log, report
     axes = {name: axis for name, axis in log.axes.items() if name == origin.axis}
@@ -215,11 +210,8 @@ def _read(task: Task, origin: Origin) -> tuple[Log, CheckReport]:
 
 
 def _fits(task: Task, log: Log, machine: Machine) -> FitResult:
-    try:
-        with parallel(1), heard():
-            return fit(machine.model, {task.name: log})
-    except InputError as error:
-        raise Refused(LogFault.UNFITTED, str(error)) from error
+    with _refusing(LogFault.UNFITTED), parallel(1), heard():
+        return fit(machine.model, {task.name: log})
 
 
 def _of_check(report: CheckReport) -> Iterator[Row]:

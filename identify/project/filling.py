@@ -131,45 +131,28 @@ def _simulated(folder: Folder, project: Project, given: Given) -> list[str]:
     return [str(folder.free_name("experiments", f"{stem}-simulated-{{}}.mcap"))]
 
 
-_ROLES = {
-    "logs": _logs("training"), "holdout": _logs_if_any("selection"), "test": _logs_if_any("test")
-}  # fmt: skip
+_TO_FIT = {"logs": _logs("training")}
+_HELD = {"holdout": _logs_if_any("selection"), "test": _logs_if_any("test")}
 _TESTS = {"logs": _logs("test", "selection", "training")}
 _ALL = {"logs": _logs("training selection test")}
 _NEW_MODEL = {"out": _free("models", "{}.toml")}
-
-
-def _split(inputs: Mapping[str, Source], first: Mapping[str, Source]) -> dict[str, Source]:
-    return {**first, "logs": inputs["logs"]}
-
-
-def _rest(inputs: Mapping[str, Source]) -> dict[str, Source]:
-    return {name: source for name, source in inputs.items() if name != "logs"}
-
-
 _OF_MODEL = {"model": _model}
 FILLINGS: Mapping[str, Filling] = {
     "import": Filling({}, {"out": _imported}, None),
     "new": Filling({"logs": _logs("training selection")}, _NEW_MODEL | {"name": _named}),
-    "fit": Filling(_split(_ROLES, _OF_MODEL), _rest(_ROLES) | _NEW_MODEL),
+    "fit": Filling(_OF_MODEL | _TO_FIT, _HELD | _NEW_MODEL),
     "diagnose": Filling(
-        _split(_ROLES, _OF_MODEL), _rest(_ROLES) | {"html": _free("answers", "{}-diagnose.html")}
+        _OF_MODEL | _TO_FIT, _HELD | {"html": _free("answers", "{}-diagnose.html")}
     ),
-    "compare": Filling(
-        _split(_TESTS, _OF_MODEL), {"html": _free("answers", "{}-compare.html")}
-    ),
-    "add": Filling(
-        _split(_ROLES, {"effect": _found, **_OF_MODEL}), _rest(_ROLES) | _NEW_MODEL
-    ),
-    "remove": Filling(_split(_ROLES, _OF_MODEL), _rest(_ROLES) | _NEW_MODEL),
+    "compare": Filling(_OF_MODEL | _TESTS, {"html": _free("answers", "{}-compare.html")}),
+    "add": Filling({"effect": _found} | _OF_MODEL | _TO_FIT, _HELD | _NEW_MODEL),
+    "remove": Filling(_OF_MODEL | _TO_FIT, _HELD | _NEW_MODEL),
     "plan": Filling(
-        _split(_ROLES, _OF_MODEL),
-        {"holdout": _ROLES["holdout"], "out": _free("experiments", "{}.toml")},
+        _OF_MODEL | _TO_FIT,
+        {"holdout": _HELD["holdout"], "out": _free("experiments", "{}.toml")},
     ),
-    "feedforward": Filling(_split(_TESTS, _OF_MODEL), {"before": _model_before}),
-    "frf": Filling(
-        {"logs": _logs("training selection test")}, {"plot": _free("answers", "{}-frf.png")}
-    ),
+    "feedforward": Filling(_OF_MODEL | _TESTS, {"before": _model_before}),
+    "frf": Filling(_ALL, {"plot": _free("answers", "{}-frf.png")}),
     "cut": Filling({}, {"out": _cut}, None),
     "check": Filling(_ALL, {}),
     "info": Filling(_ALL, {}),
@@ -180,5 +163,5 @@ FILLINGS: Mapping[str, Filling] = {
         "log",
     ),
     "simulate": Filling({}, {"model": _present_model, "out": _simulated}, None),
-}  # fmt: skip
+}
 """By command; a command that is not here knows nothing of a project."""
