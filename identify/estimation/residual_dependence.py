@@ -135,8 +135,8 @@ def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     for what, along in _forces(base, dataset, where).items():
         by = {c: share(base.residual, where[c], along) for c in where if _may_vary(what, c)}
         name = _foremost(by)
-        # nearly all of it, as what varies leaves little else
-        if by[name] > max(found.share_of_error * _times_more(found), RULE.rather):
+        most = 0.6  # of the error: a half of it some product accounts for in one log
+        if by[name] > max(found.share_of_error * _times_more(found), most):
             found = Dependence(by[name], name, None, unit_of(name, motion), shares, what)
     return found
 
