@@ -73,6 +73,17 @@ def test_the_measured_column_is_told_by_its_noise_and_the_force_that_answers_it(
     assert found.slope == pytest.approx(1.0, abs=0.01)
 
 
+def test_a_start_at_speed_of_some_samples_is_no_noise_that_a_force_answers():
+    """A log that begins while the axis moves: its setpoint was taken for the reading."""
+    starts = 12  # samples
+    swings = np.zeros(len(SERVO.time))
+    swings[:starts] = np.sin(np.arange(starts) * 2.0) * np.linspace(1.0, 0.0, starts)
+    for size in (1e-7, 1e-6, 1e-5):  # m
+        position, force = SERVO.position + size * swings, SERVO.force * (1.0 + 9.0 * swings)
+        c = columns_of({"p": position, "s": SERVO.setpoint, "f": force})
+        assert follows(c["p"], c["s"], c["f"]) >= 2
+
+
 @pytest.mark.parametrize("names", [("act_pos", "cmd_pos"), ("cmd_pos", "act_pos")])
 def test_setpoint_and_position_exchanged_are_found(tmp_path, names):
     columns = dict(zip(names, (SERVO.position, SERVO.setpoint), strict=True))
