@@ -252,6 +252,7 @@ def test_what_a_file_states_itself_is_believed(tmp_path, name, write, text, rate
         ("log.mat", changed(write_mat), MAP.replace(RATED, ""),
          r"log\.mat: does not state its sample rate"),
         ("log.xyz", changed(write_csv), MAP, r"ends in '\.xyz', known are \.csv"),
+        ("log.xlsx", changed(write_csv), MAP, r"is a workbook; save the sheet"),
         ("log.xyz", changed(write_csv), 'format = "xlsx"\n' + MAP,
          "format = 'xlsx'; allowed: csv, halsampler"),
         ("none.csv", lambda path: None, MAP, r"none\.csv: cannot be read"),
