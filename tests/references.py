@@ -106,6 +106,12 @@ def axis_coupling(p: Values, q: Columns) -> Results:
     return {OUT: -np.stack([q.a_other, q.v_other], 1) @ [p["mass"], p["damping"]]}
 
 
+@written_from("F = stiffness (x_other - x) + damping (v_other - v)")
+def skew_stiffness(p: Values, q: Columns) -> Results:
+    apart = np.stack([q.x_other - q.x, q.v_other - q.v], axis=1)
+    return {OUT: apart @ [p["stiffness"], p["damping"]]}
+
+
 @written_from(
     "F = -sum_i f_i e_i/d_i;  e_i follows x within +-d_i;  d_i = reach (1, 1/2, 1/4, 1/8)"
 )

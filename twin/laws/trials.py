@@ -84,9 +84,10 @@ def forces(effects: Sequence[Fitted], motion: TrialMotion) -> dict[str, Array]:
     states = np.zeros(table.n_states + 1)  # a law on trial may write behind its own
     first, last, state, _, _ = table.axes[0]
     signals = np.stack([motion.x, motion.v, motion.u, motion.u, motion.v])  # load, another joint
+    other = np.stack([-motion.x, -motion.v, motion.u])  # axis, which moves against this one
     walk(
         table.entries, first, last, table.parameters, states, state, signals,
-        np.vstack([signals[:3], channels(len(motion))]), motion.dt, 0, rows, 1.0, 0.0,
+        np.vstack([other, channels(len(motion))]), motion.dt, 0, rows, 1.0, 0.0,
     )  # fmt: skip
     return {name: rows[i] for i, (_, name) in enumerate(table.labels)}
 
