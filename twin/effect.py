@@ -355,6 +355,11 @@ class Effect:
         return any(self.reads(slot) for slot in ("X_OTHER", "V_OTHER", "A_OTHER"))
 
     @property
+    def is_between_axes(self) -> bool:
+        """Whether it is a force of two axes on each other; a friction may do without the other."""
+        return self.kind is Kind.FORCE and self.reads_other_axis
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """The fields of a log, such as "pressure", that the law reads beside the motion."""
         return tuple(field for slot, field in CHANNELS.items() if self.reads(slot))

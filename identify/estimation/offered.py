@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import is_informative, require_informative, telling
 from identify.dataset.prepared_log import sticks
+from twin.core.walks import CHANNEL_ROW
 from twin.effect import Effect
 from twin.effects import Catalogue
 from twin.errors import InputError
@@ -84,10 +85,14 @@ def _is_fitted(axis: AxisModel, effect: Effect) -> bool:
 
 
 def is_logged(effect: Effect, dataset: Dataset) -> bool:
-    """Whether all logs hold what the law reads beside the motion, of several the first."""
-    return all(
-        field in log.motion.channels for field in effect.channels[:1] for log in dataset.logs
-    )
+    """Whether all logs hold what the law reads beside the motion, of several the first.
+
+    Of a force between two axes one log at least has to hold the other axis.
+    """
+    motions = [log.motion for log in dataset.logs]
+    if effect.is_between_axes and not any(m.others[:CHANNEL_ROW].any() for m in motions):
+        return False
+    return all(field in m.channels for field in effect.channels[:1] for m in motions)
 
 
 def not_tried(
@@ -99,7 +104,8 @@ def not_tried(
     """
     axis, found = model.axes[dataset.axis], dict[str, NotTried]()
     for name, effect in catalogue.items():
-        if name in axis.names or effect.is_nonparametric:
+        alone = len(model.axes) == 1 and not model.can_use(effect)  # there is no other axis
+        if name in axis.names or effect.is_nonparametric or alone:
             continue
         if (why := model.hindrance(effect, dataset.axis)) is not None:
             found[name] = why

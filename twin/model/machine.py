@@ -412,7 +412,7 @@ class MachineModel:
     def __post_init__(self) -> None:
         require_number("sample_rate", self.sample_rate, "Hz", most=1e7)
         for name, axis in self.axes.items():
-            for f in axis.effects:
+            for f in axis.effects if len(self.axes) > 1 else ():  # one may be a part of two
                 self.require_usable(f.effect, name)
 
     def __repr__(self) -> str:
@@ -420,8 +420,9 @@ class MachineModel:
         return f"<MachineModel {self.name} at {self.sample_rate:g} Hz, {axes or 'no axes'}>"
 
     def can_use(self, effect: Effect) -> bool:
-        """Whether "the other axis" that the effect may depend on is one axis of this machine."""
-        return len(self.axes) <= MOST_AXES_OF_A_PAIR or not effect.reads_other_axis
+        """Whether "the other axis" is one axis of this machine; a friction may do without."""
+        least = 2 if effect.is_between_axes else 1
+        return least <= len(self.axes) <= MOST_AXES_OF_A_PAIR or not effect.reads_other_axis
 
     def hindrance(self, effect: Effect, axis: str) -> Hindrance | None:
         """Why a diagnosis of an axis does not offer an effect that it could have; else None."""
@@ -431,9 +432,8 @@ class MachineModel:
         """Raise InputError for an effect that this machine cannot have."""
         if not self.can_use(effect):
             raise InputError(
-                f"axis {axis}: {effect.name} depends on the other axis, and a machine with "
-                f"{len(self.axes)} axes has several; remove it, or give a model of the two axes "
-                "alone"
+                f"axis {axis}: {effect.name} depends on the other axis of two, and this machine "
+                f"has {len(self.axes)}; remove it, or give a model of the two axes alone"
             )
 
     @property

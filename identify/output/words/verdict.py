@@ -38,6 +38,9 @@ def verdict_in_words(found: AxisDiagnosis) -> str:
             f"{times:.1f} times what is known to make noise: nothing that was measured predicts "
             "what is left, and its origin is not known."
         ]
+    odd = found.dataset.odd
+    if odd and not odd.at_rest and not found.findings:
+        said.append(f"{odd.log} disagrees with the other logs: see the notes.")
     if reshaped := _reshaped(found):
         said.append(f"The law of {listed(reshaped)} has another shape too.")
     said += [f"The logs cannot tell {ties}."] if (ties := _ties(found)) else []

@@ -19,6 +19,7 @@ from identify.dataset.odd_log import Disagreement, Otherwise, Recorded
 from identify.estimation.disagreement import odd_in
 from identify.estimation.fit import Fit, fit_axis
 from identify.output.words.odd import odd_in_words, with_odd
+from identify.output.words.verdict import verdict_in_words
 from identify.selection.acceptance import Judged
 from identify.selection.diagnosis import AxisDiagnosis
 from identify.selection.doubts import Conclusion
@@ -348,3 +349,24 @@ def test_a_check_tells_the_log_that_disagrees_and_nothing_where_none_does() -> N
     assert (finding.fault, finding.axis) == (Fault.ODD, "x")
     assert "5" in finding.what
     assert made["two"].ok
+
+
+@pytest.mark.short(2)
+def test_the_odd_one_of_three_logs_is_told_though_a_test_log_decides_nothing() -> None:
+    """README's way, one to fit, one to choose, one to test: a brake dragged in the first."""
+
+    def braked(force: Array) -> Array:
+        force[2000:3500] += 3.0
+        return force
+
+    logs = runs()
+    spoiled = with_force(logs["run1"], braked)
+    found = identify.diagnose(
+        MODEL, {"run1": spoiled}, {"run2": logs["run2"]}, {"run3": logs["run3"]}, catalogue=FEW
+    ).axes["x"]
+    assert found.dataset.odd is not None
+    assert found.dataset.odd.log == "run1"
+    assert found.dataset.odd.span is not None
+    assert 2.0 < found.dataset.odd.span[0] < found.dataset.odd.span[1] < 3.5
+    assert [log.motion.name for log in found.dataset.training] == ["run1"]
+    assert "run1 disagrees with the other logs: see the notes." in verdict_in_words(found)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from planted_logs import RATE, RUBS, Ride, few
+from planted_logs import RATE, RUBS, SLIDE, Ride, few, having, logged
 
 import identify
+from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisModel, MachineModel
 
@@ -44,3 +45,15 @@ def test_the_stiffness_against_skew_is_named_on_both_drives() -> None:
         assert axis.named == ("skew_stiffness",)
         law = axis.findings[0].parameters
         assert law["stiffness"] == pytest.approx(STIFFNESS, rel=0.02)
+
+
+def test_a_force_between_two_axes_is_none_of_one() -> None:
+    """Beside nothing the distance to the other axis is the position: it tied with a spring."""
+    sprung = having(SLIDE, "spring", k1=60.0)
+    one, held, test = (logged(sprung, Ride(seed)) for seed in (1, 2, 3))
+    model = MachineModel("m", {"x": SLIDE}, RATE)
+    known = few("skew_stiffness", "axis_coupling", "spring")
+    found = identify.diagnose(model, one, held, test, catalogue=known).axes["x"]
+    assert found.answers == (("spring",),)
+    with pytest.raises(InputError, match="other axis of two, and this machine has 1"):
+        identify.add("skew_stiffness", model, one, held)
