@@ -208,8 +208,9 @@ def attached_joint(axis: str, effect: str) -> str:
 def _set_mass(model: MachineModel, spec: mujoco.MjSpec, name: str) -> None:
     """Give the body of a linear axis what is left of the moved mass beside all that it carries."""
     body, moved = spec.joint(name).parent, model.axes[name].weighed.mass
-    if not body.explicitinertial and not body.geoms:
-        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+    bodies = [joint.parent for joint in map(spec.joint, model.axes) if joint is not None]
+    for bare in (b for b in bodies if not b.explicitinertial and not b.geoms):
+        bare.mass, bare.inertia, bare.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
     made = spec.compile()
     own = made.body(body.id)
     inside = float(made.body_subtreemass[body.id] - own.mass[0])

@@ -67,7 +67,8 @@ def test_the_mass_is_the_models_where_the_file_has_it_by_geoms() -> None:
     inertial, geom = '<inertial pos="0 0 0" mass="1"', '<geom type="box" size="1 1 1" mass="1"'
     file = STACKED.replace(inertial + ' diaginertia="1 1 1"', geom)
     tool = file.replace("</body>", '<body name="tool"><geom size="0.1" mass="2"/></body></body>', 1)
-    for mjcf, upper in ((file, 6.0), (tool, 4.0)):
+    bare = STACKED.replace(inertial + ' diaginertia="1 1 1"/>', "")
+    for mjcf, upper in ((file, 6.0), (tool, 4.0), (bare, 6.0)):
         made = built(replace(STAGE, mjcf=mjcf))
         assert made.body("upper").mass[0] == pytest.approx(upper)
         assert made.body("lower").mass[0] == pytest.approx(9.0)
