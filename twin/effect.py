@@ -294,7 +294,7 @@ class Effect:
         told = (knee.imitation(values, covered) for knee in self.knees)
         return next((found for found in told if found), None)
 
-    def bends(self, values: Mapping[str, float], covered: Excitation) -> float:
+    def presliding(self, values: Mapping[str, float], covered: Excitation) -> float:
         """Distance over which its contacts bend before they slide, m; 0 where it has none."""
         return max((k.size(values, covered) for k in self.knees if k.name == REACH), default=0.0)
 

@@ -71,7 +71,7 @@ class Excitation:
     """Mean of what was logged of it, K."""
     fewest_cycles: float = 1.0
     """Cycles that have to be seen of what is said to repeat."""
-    bends: float = 0.0
+    presliding: float = 0.0
     """Distance over which the contacts of the model's friction bend before they slide, m."""
 
     @property

@@ -87,15 +87,12 @@ def unit_of(coordinate: str, motion: Motion, linear: Mapping[str, str] = UNITS) 
     return units(known.get(coordinate, LINEAR.position))
 
 
-def share(residual: Array, coordinate: Array, along: Array | None = None) -> float:
+def share(residual: Array, coordinate: Array) -> float:
     """Part of the residual's square that its means over bins of the coordinate explain, 0..1.
 
     The finest of several widths is taken that the data carry, each adjusted for what as many bins
-    explain of noise with the same effective sample size. along (n,): to what it is in proportion in
-    each bin, where it is no force by itself; a value of a model varies slowly, by few bins.
+    explain of noise with the same effective sample size.
     """
-    if along is not None:
-        return _share(residual, coordinate, along, BINS[0])
     widths = [bins for bins in BINS if bins == BINS[0] or len(residual) > 5 * bins]
     return max(_share(residual, coordinate, np.ones(len(residual)), bins) for bins in widths)
 
@@ -112,15 +109,16 @@ def _foremost(shares: Mapping[str, float]) -> str:
 
 
 def _share(residual: Array, coordinate: Array, along: Array, bins: int) -> float:
+    """The same of so many bins, in each of which it is in proportion to a force along (n,)."""
     levels = np.unique(np.quantile(coordinate, np.linspace(0.0, 1.0, bins + 1)))
     if len(levels) < 2:
         return 0.0
     index = np.clip(np.searchsorted(levels, coordinate, side="right") - 1, 0, len(levels) - 2)
     square = np.bincount(index, along**2, len(levels) - 1)
     slope = np.bincount(index, along * residual, len(levels) - 1) / np.where(square, square, 1.0)
-    told = slope[index] * along
-    explained = float(np.sum(told * residual) / np.sum(residual**2))
-    n = effective_samples(residual - told)
+    mean = slope[index] * along
+    explained = float(np.sum(mean * residual) / np.sum(residual**2))
+    n = effective_samples(residual - mean)
     k = len(square)
     return max(1.0 - (1.0 - explained) * n / max(n - k, 1.0), 0.0) if n > k else 0.0
 
@@ -133,7 +131,10 @@ def find_dependence(base: Fit, dataset: Dataset) -> Dependence:
     name, motion = _foremost(shares), dataset.training[0].motion
     found = Dependence(shares[name], name, lines.get(name), unit_of(name, motion), shares)
     for what, along in _forces(base, dataset, where).items():
-        by = {c: share(base.residual, where[c], along) for c in where if _may_vary(what, c)}
+        slowly = BINS[0]  # as a value of a model varies
+        by = {
+            c: _share(base.residual, where[c], along, slowly) for c in where if _may_vary(what, c)
+        }
         name = _foremost(by)
         most = 0.6  # of the error: a half of it some product accounts for in one log
         if by[name] > max(found.share_of_error * _times_more(found), most):

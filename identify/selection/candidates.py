@@ -180,8 +180,8 @@ def imitation_of(
 ) -> Imitation | None:
     """What a law of an axis is where it is not itself; ended: labels of what a fit held there."""
     effect, values = fitted.effect, fitted.values
-    beside = max((f.effect.bends(f.values, covered) for f in axis.effects), default=0.0)
-    covered = replace(covered, bends=beside)
+    beside = max((f.effect.presliding(f.values, covered) for f in axis.effects), default=0.0)
+    covered = replace(covered, presliding=beside)
     names = [label.split(".")[-1] for label in ended]
     past = [
         {**values, n: values[n] * (1.0 + way * 2.0 * AT_EDGE)} for n in names for way in (-1, 1)

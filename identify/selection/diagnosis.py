@@ -19,7 +19,7 @@ from identify.selection.changes import Added, control
 from identify.selection.doubts import Conclusion, concluded
 from identify.selection.findings import Finding, FindingKind
 from identify.selection.lengths import at_another_length
-from identify.selection.odd_logs import odd_told_by_all, without_odd_log
+from identify.selection.odd_logs import surely_odd, without_odd_log
 from identify.selection.refusal import Refusal
 from identify.selection.roles import RoleDependent, role_dependent, with_exchanged
 from identify.selection.search import Found, Step
@@ -172,7 +172,7 @@ def diagnose_axis(
     # Either may be known by too low a floor; what the logs differ by is told.
     quiet = final.fit.at_floor or final.other_at_floor
     return AxisDiagnosis(
-        dataset=replace(found.dataset, odd=odd or odd_told_by_all(ended, dataset)),
+        dataset=replace(found.dataset, odd=odd or surely_odd(ended, dataset)),
         base=found.base.fit,
         ranking=found.ranking,
         steps=found.passed,

@@ -132,7 +132,7 @@ def _others(base: Fit, dataset: Dataset, odd: str | None) -> tuple[Fit, Dataset]
     return replace(fit_axis(base.axis, rest.training), begun=base.begun), rest
 
 
-def odd_told_by_all(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
+def surely_odd(ended: Conclusion, dataset: Dataset) -> Disagreement | None:
     """The log that surely disagrees with all others beside all that was found."""
     return odd_in_all(ended.found.final.fit.axis, _as_found(ended, dataset))
 

@@ -46,7 +46,7 @@ EFFECT = Effect(
         at("time", "s", lambda e: (e.period, e.duration), Imitated.DRY_FRICTION),
         # contacts are renewed as they slide, not as they bend: a shorter slip has no peak to show
         at(
-            "slip", "m", lambda e: (e.bends, e.travel),
+            "slip", "m", lambda e: (e.presliding, e.travel),
             Imitated.WITHOUT_PEAK, Imitated.DRIFT,
         ),
     ),

@@ -153,10 +153,10 @@ def test_a_dahl_without_a_bound_is_a_spring():
 
 def test_contacts_that_only_bend_do_not_age_anew():
     """Beside a friction with memory: named under an encoder's steps with a slip of 2.3 of 18 um."""
-    bends = CATALOGUE["lugre"].bends({**values_of(CATALOGUE["lugre"]), "sigma0": 25e3}, SEEN)
+    bends = CATALOGUE["lugre"].presliding({**values_of(CATALOGUE["lugre"]), "sigma0": 25e3}, SEEN)
     assert bends == pytest.approx(0.5 / 25e3)
-    assert CATALOGUE["stribeck"].bends(values_of(CATALOGUE["stribeck"]), SEEN) == 0.0
-    dwell, seen = CATALOGUE["dwell_stiction"], replace(SEEN, bends=bends)
+    assert CATALOGUE["stribeck"].presliding(values_of(CATALOGUE["stribeck"]), SEEN) == 0.0
+    dwell, seen = CATALOGUE["dwell_stiction"], replace(SEEN, presliding=bends)
     for slip, imitated in [(0.2 * bends, Imitated.WITHOUT_PEAK), (5.0 * bends, None)]:
         found = dwell.imitation({**values_of(dwell), "slip": slip}, seen)
         assert (found and found.of) is imitated
