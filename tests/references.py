@@ -428,3 +428,14 @@ def base_vibration(p: Values, q: Columns) -> Results:
 def payload_mass(p: Values, q: Columns) -> Results:
     """F = m a + ratio m a: what the payload takes for itself is missing."""
     return {OUT: q.moved * q.acc - (1.0 + p["ratio"]) * q.moved * q.acc}
+
+
+@written_from(
+    "F = -m (J(x) a + J'(x) v^2/2);  J = sum_{k=1,2,3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)"
+)
+def varying_inertia(p: Values, q: Columns) -> Results:
+    """By Lagrange: d/dt (m J v) - m J' v^2/2, with J' by differences of J."""
+    step = 1e-5 * p["p"]
+    inertia, after, before = (fourier(p, (q.x + d) / p["p"]) for d in (0.0, step, -step))
+    slope = (after - before) / (2.0 * step)
+    return {OUT: -q.moved * (inertia * q.acc + slope * q.v**2 - 0.5 * slope * q.v**2)}

@@ -340,9 +340,16 @@ class Effect:
         By kind. Of those that make a reading, first what remembers: a delay is of the smooth
         position, of which samples tell what was between them. Rounding is last.
         """
+        if self.kind is Kind.STRUCTURE:
+            return self.kind.value, 0 if self.is_of_bodies else 1
         if self.kind is not Kind.SENSING:
             return self.kind.value, 0
         return self.kind.value, 0 if self.states else 2 if self.is_noise else 1
+
+    @property
+    def is_of_bodies(self) -> bool:
+        """Whether bodies of MuJoCo have it: what it hangs on the axis, or a mass that it adds."""
+        return self.attach is not None or self.added_mass is not None
 
     @property
     def is_noise(self) -> bool:

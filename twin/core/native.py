@@ -261,6 +261,9 @@ class Table:
     """(n_p,) of all effects, one after the other."""
     axes: NDArray[np.int64]
     """(n_axes, 5): first entry, last entry, first state, first and last sensing entry."""
+    bodiless: NDArray[np.int64]
+    """(n_axes,) first entry of the structure effects that are no bodies of MuJoCo, up to the last
+    entry of the axis."""
     masses: NDArray[np.float64]
     """(n_axes,) kg, moved."""
     n_states: int
@@ -279,6 +282,7 @@ def build_table(
     """Table of a model: axis name -> its effects with their parameter values in catalogue order."""
     rows: list[tuple[int, int, int, int]] = []
     spans: list[tuple[int, int, int, int, int]] = []
+    bodiless: list[int] = []
     parameters: list[float] = []
     labels: list[tuple[str, str]] = []
     remembers: list[bool] = []
@@ -288,6 +292,7 @@ def build_table(
         n_states += 4  # of the axis itself, before those of its effects
         begin = len(rows)
         sensing = begin
+        without = 0
         bristles = any(e.remembers for e, _ in effects if e.kind is Kind.FRICTION)
         for effect, values in sorted(effects, key=lambda e: e[0].turn):
             rows.append((law_address(effect), effect.kind.value, len(parameters), n_states))
@@ -296,11 +301,14 @@ def build_table(
             parameters.extend(values)
             n_states += len(effect.states)
             sensing += effect.kind is Kind.SENSING
+            without += effect.kind is Kind.STRUCTURE and not effect.is_of_bodies
+        bodiless.append(len(rows) - without)
         spans.append((sensing, len(rows), state_at, begin, sensing))
     return Table(
         entries=np.array(rows, dtype=np.int64).reshape(-1, 4),
         parameters=np.array([*parameters, 0.0]),
         axes=np.array(spans, dtype=np.int64),
+        bodiless=np.array(bodiless, dtype=np.int64),
         masses=np.array(masses, dtype=float),
         n_states=n_states,
         labels=tuple(labels),

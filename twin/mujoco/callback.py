@@ -53,7 +53,9 @@ NUMERIC = "proton_twin_table"
 MAGIC = 0.3401950653e77  # no model holds this by chance
 HEADER = 7  # period, axes, states, entries, parameters, first userdata, parts
 USER_HEADER = 2  # time of the last call, s; time origin, s; then the states
-AXIS_COLUMNS = 8  # first part, last part, actuator, first entry, last entry, state, mass, rotor
+# First part, last part, actuator, first entry, last entry, state, mass, rotor, first bodiless
+# entry, the base's dof.
+AXIS_COLUMNS = 10
 PART_COLUMNS = 3  # of a joint that is part of an axis: qpos, dof, ratio
 
 
@@ -235,10 +237,16 @@ def passive_forces(block, data, off):
             io[X_OTHER] = summed(axes[b], parts, 0, qpos)
             io[V_OTHER] = summed(axes[b], parts, 1, qvel)
             io[A_OTHER] = start[int(axes[b, 5]) + LAST_ACCELERATION]
-        # What the structure adds is known for the log; MuJoCo's own bodies put it on the axis.
+        # What bodies add is known for the log; MuJoCo's own put it on the axis.
         force, _ = axis_force(
             entries, int(axes[a, 3]), int(axes[a, 4]), parameters, after, own, io, rows, 0
         )
+        inertial = 0.0  # such a force acts in space: what the axis stands on takes no counterforce
+        for i in range(int(axes[a, 8]), int(axes[a, 4])):
+            inertial += rows[0, i]
+        force += inertial
+        if axes[a, 9] >= 0.0:
+            passive[int(axes[a, 9])] += inertial
         for i in range(int(axes[a, 0]), int(axes[a, 1])):  # MuJoCo adds the command
             passive[int(parts[i, 1])] += parts[i, 2] * (force - command)
 
@@ -267,12 +275,14 @@ class DrivenAxis(NamedTuple):
     """An axis in a spec: its joint or fixed tendon, its motor, and the mass (kg) of its friction.
 
     rotor: kg, of its own inertia beside the bodies of a mechanism; below 0 on a plain axis.
+    base: the joint along the axis of what it stands on; empty where that is the world.
     """
 
     joint: str
     motor: str
     mass: float
     rotor: float = -1.0
+    base: str = ""
 
 
 Parts = list[tuple[int, float]]  # joints and ratios, by which they add up to an axis
@@ -322,8 +332,10 @@ def attach(
     at = joints.astype(np.int64)
     parts = np.column_stack([model.jnt_qposadr[at], model.jnt_dofadr[at], ratios])
     spans = [
-        (*place, *entry[:3], axis.mass, axis.rotor)
-        for axis, place, entry in zip(axes, where, table.axes, strict=True)
+        (*place, *entry[:3], axis.mass, axis.rotor, bodiless, _dof(model, axis.base))
+        for axis, place, entry, bodiless in zip(
+            axes, where, table.axes, table.bodiless, strict=True
+        )
     ]
     # Doubles hold any address below 2^53 exactly, so that a table can travel in an mjModel.
     numbers = [
@@ -336,6 +348,10 @@ def attach(
     size = USER_HEADER + 2 * table.n_states + len(table.entries) + IO_SIZE
     spec.nuserdata = model.nuserdata + size
     return Attached(model.nuserdata, where, parts)
+
+
+def _dof(model: mujoco.MjModel, joint: str) -> int:
+    return model.jnt_dofadr[model.joint(joint).id] if joint else -1
 
 
 @entered_once

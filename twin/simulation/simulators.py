@@ -19,7 +19,6 @@ from twin.experiments.trajectory import AnySetpoint, Setpoint
 from twin.model.machine import MachineModel
 from twin.mujoco.callback import (
     USER_HEADER,
-    DrivenAxis,
     attach,
     native_address,
     offsets,
@@ -85,7 +84,7 @@ class MujocoSimulator:
         import mujoco
 
         from twin.model.bodies import mechanism_in
-        from twin.simulation.spec import driven, jointed_spec, machine_spec
+        from twin.simulation.spec import driven, jointed_spec, machine_spec, plain
 
         self._transmission = None
         if model.joints:
@@ -93,8 +92,7 @@ class MujocoSimulator:
             self._transmission = mechanism_in(model).transmission
         else:
             spec = machine_spec(model)
-            pairs = zip(model.axes, table.masses, strict=True)
-            axes = [DrivenAxis(a, f"motor_{a}", mass) for a, mass in pairs]
+            axes = plain(model, spec)
         self._own = attach(spec, table, model.period, axes)
         # A bad state stays bad, and is found, instead of starting again from zero.
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from twin.errors import CannotRun, InputError
 from twin.model.bodies import mechanism_in
-from twin.model.machine import MachineModel
+from twin.model.machine import AxisModel, MachineModel
 from twin.model.units import LINEAR, ROTARY, AxisUnits
 from twin.mujoco.callback import DrivenAxis
 from twin.mujoco.mechanism import strip_passive
@@ -283,6 +283,19 @@ def _plain_joints(model: MachineModel) -> mujoco.MjSpec:
         body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
         add_motor(spec, name, name)
     return spec
+
+
+def plain(model: MachineModel, spec: mujoco.MjSpec) -> list[DrivenAxis]:
+    """The axes of such a spec."""
+    return [
+        DrivenAxis(name, f"motor_{name}", axis.mass, base=_base(spec, name, axis))
+        for name, axis in model.axes.items()
+    ]
+
+
+def _base(spec: mujoco.MjSpec, name: str, axis: AxisModel) -> str:
+    built = [spec.joint(attached_joint(name, f.effect.name)) for f in axis.effects]
+    return next((j.name for j in built if j and _carries(j.parent, name)), "")
 
 
 def jointed_spec(model: MachineModel) -> mujoco.MjSpec:

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
-from axis_runs import BOTH, Stepper
+from axis_runs import BOTH, Stepper, effect
 from constructed import two_waves
 from effect_runs import with_all
 from machines import CATALOGUE, PROTON
@@ -14,6 +15,7 @@ from twin.effect import Effect
 from twin.laws.trials import moderate
 from twin.logs import Log
 from twin.model.machine import AxisModel, Fitted, Hardware, MachineModel
+from twin.mujoco.callback import passive_callback
 from twin.signals import Array
 from twin.simulation.simulate import simulate
 from twin.simulation.simulators import MujocoSimulator, ReducedSimulator, run
@@ -114,3 +116,22 @@ def test_on_the_other_axis_an_effect_does_the_same(effect: Effect, stage: Steppe
         assert np.all(difference <= 1e-8 * np.abs(one).max(axis=(0, 1)))
     without = signals(SLIDE, HEAVIER, stage)
     assert np.abs(one[:, 0] - without[:, 0]).max() > 1e-9, "it does nothing"
+
+
+def test_a_free_crank_keeps_its_energy() -> None:
+    """m (1 + J(x)) v^2/2, by the sums of its own series; it slows and speeds up in each turn."""
+    crank = effect("varying_inertia", p=0.1, b1=0.1, a2=0.2, b2=-0.3, b3=-0.1)
+    machine = MachineModel("free", {"x": AxisModel(2.0, effects=(crank,))}, 1.0 / 2e-5)
+    with passive_callback():
+        free = MujocoSimulator(machine, machine.table())
+        free.data.qvel[:] = 0.5
+        path = np.empty((2, 20000))
+        for k in range(path.shape[1]):
+            mujoco.mj_step(free.model, free.data)
+            path[:, k] = free.data.qpos[0], free.data.qvel[0]
+    x, v = path
+    turns = 2.0 * np.pi * np.outer((1, 2, 3), x / 0.1)
+    inertia = 1.0 + [0.1, -0.3, -0.1] @ np.cos(turns) + [0.0, 0.2, 0.0] @ np.sin(turns)
+    energy = inertia * v**2
+    assert v.max() > 1.3 * v.min()
+    np.testing.assert_allclose(energy, energy[0], rtol=2e-3)
