@@ -17,6 +17,7 @@ from twin.checks.explain import (
     find_lag,
     find_trend,
     fit_dynamics,
+    slower_refutes,
 )
 from twin.checks.report import WHOLE, Fault, LogFinding, Place, Severity
 from twin.logs.log import AxisLog
@@ -216,7 +217,7 @@ class Axis:
         """Lag of the command behind the motion that it causes, s; 0 where none is clear.
 
         Nor where friction with a memory explains it: what lags by a distance and not by a time is
-        none. How long it is, is told away from standstill.
+        none, nor what slower motion has no part in. How long it is, is told away from standstill.
         """
         found = self.lag_of(self.force, self.regressors) if self._changes_often else 0.0
         beside = self.lag_of(self.force, self.remembering) if found else 0.0
@@ -225,7 +226,13 @@ class Axis:
             return 0.0
         going, _ = find_lag(self.force, self.regressors, self.going, self.smoother.block)
         told = self.going.mean() > KEPT_PART
-        return going if told and abs(going - found) < PHYSICAL else found
+        lag = going if told and abs(going - found) < PHYSICAL else found
+        return lag if self.may_be_late(lag) else 0.0
+
+    def may_be_late(self, seconds: float) -> bool:
+        """Whether the force may be so many s late: slower motion is not better without it."""
+        told = self.going if self.going.mean() > KEPT_PART else self.kept
+        return not slower_refutes(seconds, self.force, self.regressors, told, self.smoother)
 
     @property
     def _changes_often(self) -> bool:

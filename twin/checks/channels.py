@@ -73,7 +73,7 @@ def _steady(axis: Axis) -> Iterator[LogFinding]:
     sure = max(least, sure_lag * trend.error) < abs(trend.seconds) < PHYSICAL
     # ripple, backlash and vibration are answered by a loop: of what is left beside the noise a lag
     # takes off 1.7 there
-    if sure and _takes_off(axis, without, steady, 2.0):
+    if sure and _takes_off(axis, without, steady, 2.0) and axis.may_be_late(trend.seconds):
         what, remedy = _lagging(axis, "the force", trend.seconds, CAUSED, "force", "position")
         told = f"{what}, +- {trend.error * 1e3:.2g} ms"
         yield axis.warning(Fault.LAG, told, remedy + DEAD_TIME)

@@ -9,7 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from twin.signals import Array, between, rate, sliding_products
+from twin.signals import Array, between, moving_mean, rate, sliding_products
 
 UNUSUAL = 5.0  # times the level that 99 % of the samples stay below
 KEPT_PART = 0.2  # of a part, that moves for it to tell a lag; of moves with pauses half is rest
@@ -195,6 +195,32 @@ def find_lag(signal: Array, explained_by: Array, kept: Array, block: float) -> t
         and abs(samples) <= of_a_period * _period(signal - signal.mean())
     )
     return samples * block, bool(clear)
+
+
+def slower_refutes(
+    lag: float, signal: Array, explained_by: Array, kept: Array, smoother: Smoother
+) -> bool:
+    """Whether slower motion is explained better without a lag (s) than with it.
+
+    A delay delays all motion; what a loop answers to a disturbance is late at its frequency alone.
+    Arrays as in ``find_lag``.
+    """
+    better = 0.7  # times what the lag leaves: less than that is no matter of noise
+    for slower in (2, 4, 8):  # times the low-pass that the signals went through
+        count = (slower * len(smoother.weights)) | 1
+        whole = (_twice_smoothed(kept, count) > 1.0 - 1e-9).astype(float)
+        if np.mean(whole) < KEPT_PART:
+            break
+        columns = np.stack([_twice_smoothed(c, count) for c in explained_by.T], axis=1)
+        _, left = _left_at(_twice_smoothed(signal, count), columns, whole, smoother.block)
+        reach, at = len(left) // 2, round(lag / smoother.block)
+        if abs(at) <= reach and left[reach] < better**2 * left[reach + at]:
+            return True
+    return False
+
+
+def _twice_smoothed(signal: Array, count: int) -> Array:
+    return moving_mean(moving_mean(signal, count), count)
 
 
 def _left_at(signal: Array, explained_by: Array, kept: Array, block: float) -> tuple[Array, Array]:

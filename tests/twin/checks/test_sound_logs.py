@@ -159,10 +159,12 @@ def test_friction_with_a_memory_is_no_lag_and_hides_none(motion, gain, late):
 CART, DRY, LOOP = 8.0, 5.0, 100.0  # kg, N, rad/s
 
 
-def sticking(goal: Array, ripple: float, noise: float = 0.2) -> tuple[Array, Array]:
+def sticking(
+    goal: Array, ripple: float, noise: float = 0.2, pump: float = 0.0
+) -> tuple[Array, Array]:
     """Position (n,) m and force (n,) N of a cart with dry friction under a PID loop.
 
-    ripple: N, of a force that repeats every 5 mm.
+    ripple: N, of a force that repeats every 5 mm. pump: N, of one that repeats 25 times a second.
     """
     dt = 1.0 / RATE / FINER
     rates = np.gradient(goal) * RATE
@@ -173,8 +175,9 @@ def sticking(goal: Array, ripple: float, noise: float = 0.2) -> tuple[Array, Arr
         total += (wanted - reading[k]) / RATE
         springs = LOOP**2 * (wanted - reading[k] + LOOP / 8.0 * total)
         force[k] = u = CART * (springs + 1.6 * LOOP * (rate - v))
+        beside = pump * math.sin(50.0 * math.pi * k / RATE)
         for _ in range(FINER):
-            free = v + dt / CART * (u - 30.0 * v - ripple * math.sin(x / 8e-4))
+            free = v + dt / CART * (u + beside - 30.0 * v - ripple * math.sin(x / 8e-4))
             v = math.copysign(max(abs(free) - dt / CART * DRY, 0.0), free)
             x += v * dt
     return reading, force + noise * np.random.default_rng(1).standard_normal(len(goal))
@@ -195,6 +198,14 @@ def test_what_stops_gently_and_breaks_loose_at_once_is_no_lag_and_hides_none(lat
     found = check_log(Log(RATE, {"x": AxisLog(columns)})).findings
     assert [f.fault for f in found] == [Fault.LAG] * (late != 0)
     assert [milliseconds(f) for f in found] == pytest.approx([late] * (late != 0), abs=0.2)
+
+
+@pytest.mark.parametrize("pump", [3.0, 8.0])
+def test_what_a_loop_answers_to_a_disturbance_is_no_lag(pump: float) -> None:
+    """It is late at 25 Hz alone: the slower motion, of which most is made, has no part in it."""
+    reading, force = sticking(three_waves(0.3, 0.9, 2.1), 0.0, pump=pump)
+    columns = {"position": reading[10:-10], "force": force[10:-10]}
+    assert not faults(check_log(Log(RATE, {"x": AxisLog(columns)})))
 
 
 @pytest.mark.parametrize(
