@@ -434,8 +434,10 @@ def payload_mass(p: Values, q: Columns) -> Results:
     "F = -m (J(x) a + J'(x) v^2/2);  J = sum_{k=1,2,3} a_k sin(2 pi k x/p) + b_k cos(2 pi k x/p)"
 )
 def varying_inertia(p: Values, q: Columns) -> Results:
-    """By Lagrange: d/dt (m J v) - m J' v^2/2, with J' by differences of J."""
-    step = 1e-5 * p["p"]
-    inertia, after, before = (fourier(p, (q.x + d) / p["p"]) for d in (0.0, step, -step))
-    slope = (after - before) / (2.0 * step)
+    """By Lagrange: d/dt (m J v) - m J' v^2/2, J' from the waves of J a quarter further."""
+    inertia = fourier(p, q.x / p["p"])
+    steeper = {n: v * int(n[1:]) for n, v in p.items() if n[0] in "ab"}
+    quarter = {f"b{n[1:]}" if n[0] == "a" else f"a{n[1:]}": v for n, v in steeper.items()}
+    rising = {n: -v if n[0] == "a" else v for n, v in quarter.items()}
+    slope = 2.0 * np.pi / p["p"] * fourier(rising, q.x / p["p"])
     return {OUT: -q.moved * (inertia * q.acc + slope * q.v**2 - 0.5 * slope * q.v**2)}

@@ -1,4 +1,4 @@
-"""Inertia that varies with the position: a crank, a linkage, an arm that folds.
+"""Inertia that varies with the position: a crank, a linkage, a chain that is lifted on its way.
 
 m(x) q'' + m'(x) q'^2 / 2 = F with m(x) = m (1 + J(x)), Lagrange's equation of one coordinate: what
 a part of the mass moves by follows from the geometry. J(x) = sum_{k=1,2,3} a_k sin(2 pi k x/p) +
@@ -26,7 +26,7 @@ def law(p, s, io):
 
 EFFECT = Effect(
     kind=Kind.STRUCTURE,
-    summary="inertia varies with the position, as of a crank or a linkage",
+    summary="inertia varies with the position, as of a crank, a linkage or a chain",
     equation="F = -m (J(x) a + J'(x) v^2/2);  J = sum_{k=1,2,3} a_k sin(2 pi k x/p) + "
     "b_k cos(2 pi k x/p)",
     source="Uicker, Pennock, Shigley, Theory of Machines and Mechanisms, chapter 16",
@@ -41,9 +41,9 @@ EFFECT = Effect(
     ),
     law=law,
     knees=(
-        # over less than half a period it is any curve
+        # over a tenth of a period it is as good as constant; before that it is a curve that rises
         at(
-            "p", "m", lambda e: (COUNTS * e.resolution, 2.0 * (e.been[1] - e.been[0])),
+            "p", "m", lambda e: (COUNTS * e.resolution, 10.0 * (e.been[1] - e.been[0])),
             Imitated.ROUNDING, Imitated.INERTIA,
         ),
     ),

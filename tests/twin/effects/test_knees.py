@@ -89,7 +89,7 @@ CASES: dict[str, dict[str, list[tuple[float, Imitated | None]]]] = {
     "thermal_drift": {"tau": [(1e-3, Imitated.OF_SPEED), (20.0, None), (1e4, None)]},
     "transmission_coupling": {"joint": [(1.0, None), (0.0, Imitated.OF_THIS_JOINT)]},
     "unbalance": {"gear": [(1.2, None), (10.0, None), (30.0, Imitated.SPRING)]},
-    "varying_inertia": {"p": [(1e-9, Imitated.ROUNDING), (0.2, None), (1.0, Imitated.INERTIA)]},
+    "varying_inertia": {"p": [(1e-9, Imitated.ROUNDING), (0.2, None), (4.0, Imitated.INERTIA)]},
 }  # fmt: skip
 PHYSICAL = [e for e in CATALOGUE.values() if not e.is_nonparametric]
 
