@@ -13,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
@@ -36,16 +36,23 @@ _MARKS = (
 )  # fmt: skip
 _SECONDS = {"sec": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "hr": 3600.0}
 _WITH_UNIT = re.compile(rf"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s+({'|'.join(_SECONDS)})")  # of MATLAB
+_BY_POINTS = re.compile(r"(?<![\d:.])[1-9]\d{0,2}(\.\d{3})+(?![\d.])")  # 1.234, in no time of day
+_HUNDREDS = re.compile(r"[-+]?[1-9]\d\d")  # a whole number just below a thousand
 _ENDS = re.compile(r"\r\n|\r|\n")
 _BLOCK = 1024  # lines read at once: few enough that one bad cell makes few of them slow
 
 
 @dataclass(frozen=True)
 class Style:
-    """How a line is cut into cells, and how a cell is a number."""
+    """How a line is cut into cells, and how a cell is a number.
+
+    grouping: whether the sign that is not the decimal one groups thousands, as in 1.234,5; else a
+    file mixes both as decimal signs.
+    """
 
     delimiter: str | None
     decimal: str
+    grouping: bool = True
 
     def cells(self, line: str) -> list[str]:
         """The cells of a line; one that begins with # or % has no other first cell for that."""
@@ -58,6 +65,8 @@ class Style:
 
     def value(self, cell: str) -> float:
         """The number in a cell, which may group its thousands; raises ValueError."""
+        if self.decimal == "," and "." in cell and self.is_grouped(cell):
+            return self._less_groups(cell)
         try:
             return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
         except ValueError:
@@ -67,10 +76,28 @@ class Style:
                 return float(int(cell, 16))
             if (found := _WITH_UNIT.fullmatch(cell)) is not None:
                 return self.value(found[1]) * _SECONDS[found[2]]
-            other = "." if self.decimal == "," else ","
-            if not re.fullmatch(rf"[-+]?\d{{1,3}}([{other}'’ \xa0]\d{{3}})+([.,]\d+)?", cell):
+            if not self.is_grouped(cell):
                 raise
-            return float(re.sub(rf"[{other}'’ \xa0]", "", cell).replace(self.decimal, "."))
+            return self._less_groups(cell)
+
+    def is_grouped(self, cell: str) -> bool:
+        """Whether a cell is a number with grouped thousands, which never begins with 0."""
+        return self._grouped.fullmatch(cell) is not None
+
+    def has_grouped(self, line: str) -> bool:
+        """Whether any part of a line may be such a number by the other sign."""
+        return self.grouping and _BY_POINTS.search(line) is not None
+
+    @cached_property
+    def _grouped(self) -> re.Pattern[str]:
+        other = {",": ".", ".": ","}[self.decimal] if self.grouping else ""
+        return re.compile(
+            rf"[-+]?[1-9]\d{{0,2}}([{other}'’\s])\d{{3}}(\1\d{{3}})*({re.escape(self.decimal)}\d+)?"
+        )
+
+    def _less_groups(self, cell: str) -> float:
+        signs = {c for c in cell if not c.isalnum() and c not in "+-"} - {self.decimal}
+        return float("".join(c for c in cell if c not in signs).replace(self.decimal, "."))
 
     def is_number(self, cell: str) -> bool:
         """Whether a cell is a number."""
@@ -87,6 +114,15 @@ class Style:
             return 0.0
         cells = list(itertools.chain.from_iterable(rows))
         return sum(map(self.is_number, cells)) / max(len(cells), 1)
+
+    def grouped(self, lines: Sequence[str]) -> int:
+        """How many cells are numbers with grouped thousands, or none where the other sign counts.
+
+        Of two styles that read as many numbers the plainer is right: 1,234 is no thousand where
+        every number has three digits behind its comma, and 0,012 is none at all.
+        """
+        cells = [cell for line in lines for cell in self.cells(line)]
+        return sum(self.is_grouped(c) or not self.is_number(c) for c in cells)
 
 
 @dataclass(frozen=True)
@@ -119,12 +155,36 @@ class Head:
         lines = (*rows[:: -(-len(rows) // 40)], rows[-1])
         delimiters = (stated.delimiter,) if stated.delimiter else _DELIMITERS
         decimals = (stated.decimal,) if stated.decimal else (".", ",")
-        styles = [Style(d, p) for d in delimiters for p in decimals if d != p]
+        quoted = any('"' in line for line in lines)  # "0,1","0,2": one sign may be both
+        styles = [Style(d, p) for d in delimiters for p in decimals if d != p or quoted]
         for columns in (2, 1):  # 1,5 is two columns, unless the map states delimiter or decimal
             best = max(styles, key=lambda style: style.share_of_numbers(lines, columns))
-            if best.share_of_numbers(lines, columns) > 0.0:
-                return best
+            if (share := best.share_of_numbers(lines, columns)) > 0.0:
+                level = [s for s in styles if s.share_of_numbers(lines, columns) == share]
+                level.sort(key=lambda style: style.grouped(self.lines))
+                groups = [s for s in level if s.delimiter == best.delimiter and self._groups(s)]
+                return self._of_its_signs([*groups, *level][0])
         raise InputError("has no rows of numbers; state delimiter and decimal in the map")
+
+    def _of_its_signs(self, style: Style) -> Style:
+        """The style, without grouping by a sign that is the decimal one of other cells."""
+        return replace(style, grouping=not self._mixes(style))
+
+    def _mixes(self, style: Style) -> bool:
+        """Whether points are decimal signs too, where commas are."""
+        cells = (cell for line in self.lines for cell in style.cells(line) if "." in cell)
+        return style.decimal == "," and any(
+            "," not in cell and not style.is_grouped(cell) and style.is_number(cell)
+            for cell in cells
+        )
+
+    def _groups(self, style: Style) -> bool:
+        """Whether a column goes from 999 to 1.000: what looks like decimals are thousands."""
+        rows = [style.cells(line) for line in self.lines]
+        return not self._mixes(style) and any(
+            any(map(_HUNDREDS.fullmatch, column)) and any(map(style.is_grouped, column))
+            for column in itertools.zip_longest(*rows, fillvalue="")
+        )
 
 
 def _encoding(head: bytes) -> str:
@@ -311,6 +371,8 @@ class _Rows:
             return np.zeros(0, self._type)
         style = self._layout.style
         if style.decimal == ",":
+            if style.delimiter == "," or any(map(style.has_grouped, lines)):
+                return None
             lines = [line.replace(",", ".") for line in lines]
         stamps: dict[int | str, Callable[[str], int]] = {k: s.add for k, s in self.stamps.items()}
         try:

@@ -1,0 +1,83 @@
+"""How numbers are written: decimal signs, grouped thousands, and files in which they look alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from twin.importers import import_log
+from twin.importers.mapping import parse_mapping
+
+MAP = 'time = {column = "t", unit = "s"}\n[axes.x]\nposition = {column = "x", unit = "m"}\n'
+MAP += 'force = {column = "F", unit = "N"}\n'
+T = np.arange(0.0, 2.0, 1e-3)  # s
+X = np.round(1.7 * np.sin(2.0 * T), 3)  # m
+F = np.round(2345.0 * np.cos(2.0 * T), 0)  # N
+
+
+def comma(text: str) -> str:
+    return text.replace(",", "!").replace(".", ",").replace("!", ".")
+
+
+def quoted(text: str) -> str:
+    return f'"{comma(text)}"'
+
+
+def spaced(sign: str) -> Callable[[str], str]:
+    return lambda text: text.replace(",", sign).replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "x", "force", "written"),
+    [
+        (";", ".3f", ".0f", comma),  # each number but the force has three decimals
+        ("\t", ".3f", ".3f", comma),
+        (",", ".3f", ".3f", quoted),  # one sign for both
+        (";", ".3f", ",.0f", comma),  # 1.016 is a thousand and sixteen
+        (";", ".3f", ",.0f", str),  # and 1,016 where 0.512 has a point
+        (";", ".3f", ",.1f", spaced(" ")),
+        (";", ".3f", ",.1f", spaced("\u00a0")),
+        (";", ".3f", ",.1f", spaced("\u202f")),  # of France
+        (";", ".3f", ",.1f", spaced("’")),
+        (";", ".5g", ",.1f", comma),
+    ],
+)
+def test_a_table_is_read_as_it_was_written(
+    tmp_path: Path, delimiter: str, x: str, force: str, written: Callable[[str], str]
+) -> None:
+    rows = [
+        [written(f"{a:.3f}"), written(f"{b:{x}}"), written(f"{c:{force}}")]
+        for a, b, c in zip(T, X, F, strict=True)
+    ]
+    lines = [delimiter.join(row) for row in [["t", "x", "F"], *rows]]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    log = import_log(path, parse_mapping(MAP)).axes["x"]
+    np.testing.assert_allclose(log.position, X, atol=1e-9)
+    np.testing.assert_allclose(log.columns["force"], F, atol=1e-9)
+
+
+def test_whole_numbers_that_go_from_999_to_1000_are_grouped(tmp_path: Path) -> None:
+    """No sign of the file is a decimal one."""
+    counts = np.round(1e4 * X)
+    rows = [
+        f"{comma(f'{a:,.0f}')};{comma(f'{b:,.0f}')};{comma(f'{c:,.0f}')}"
+        for a, b, c in zip(1e3 * T, counts, F, strict=True)
+    ]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t;x;F", *rows]))
+    log = import_log(path, parse_mapping(MAP.replace('"s"', '"ms"'))).axes["x"]
+    np.testing.assert_allclose(log.position, counts)
+    np.testing.assert_allclose(log.columns["force"], F)
+
+
+def test_points_in_one_column_and_commas_in_another_are_both_decimal_signs(tmp_path: Path) -> None:
+    rows = [f"{a:.3f};{comma(f'{b:.4f}')};{c:.0f}" for a, b, c in zip(T, X, F, strict=True)]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t;x;F", *rows]))
+    log = import_log(path, parse_mapping(MAP))
+    assert log.sample_rate == pytest.approx(1e3)
+    np.testing.assert_allclose(log.axes["x"].position, X, atol=1e-9)
