@@ -29,6 +29,17 @@ _STATEMENT = re.compile(
     rf"[^\w+-]+(?P<number>\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)[\s\"]*(?P<unit>(?:{_UNIT})(?![\w/]))?",
     re.IGNORECASE,
 )
+# Of how many cycles or samples one is kept.
+_KEPT = re.compile(
+    rf"(?:decimat\w*|down[\s_-]*sampl\w*|unterabtast\w*|(?:{_SAMPLES}|{_LOGS})[\s_]*(?:factor|faktor|gap"
+    r"|divi[ds]\w*|every)|^\W*(?:gap|divider|prescaler))(?:[\s_]*(?:factor|faktor|ratio|by))?"
+    r"[^\w+-]+(?:every[\s_]+)?(?P<every>\d+)(?![\d.,]*\d|[\s_]*(?:Hz|kHz|ms|us|s)\b)",
+    re.IGNORECASE,
+)
+_EVERY = re.compile(
+    r"(?:every|jeder?)\s+(?P<every>\d+)(?:st|nd|rd|th|\.)?\s+(?:cycle|sample|point|takt|zyklus|wert)",
+    re.IGNORECASE,
+)
 _LONGEST = 300  # characters of a line that states a rate
 
 
@@ -41,17 +52,31 @@ class StatedRate:
 
 
 def stated_rate(texts: Iterable[str]) -> StatedRate | None:
-    """The first rate that any of these texts states; one without a unit where no other is."""
-    unsure = None
+    """The first rate that any of these texts states; one without a unit where no other is.
+
+    Less where they state that only every so manieth sample of it is kept.
+    """
+    texts = list(texts)
+    unsure, every = None, next((k for text in texts if (k := _kept(text)) > 1), 1)
     for text in texts:
         plain = re.sub(r"(?<!\d),|,(?!\d)|[;\t|]", " ", text[:_LONGEST])
         for found in _STATEMENT.finditer(plain):
             rate = _rate_of(found)
-            stated = StatedRate(rate, " ".join(text.replace("\t", " ").split())[:80])
+            words = " ".join(text.replace("\t", " ").split())[:80]
+            if rate is not None and every > 1:
+                return StatedRate(rate / every, f"{words}, one of {every} kept")
+            stated = StatedRate(rate, words)
             if rate is not None:
                 return stated
             unsure = unsure or stated
     return unsure
+
+
+def _kept(text: str) -> int:
+    """Of how many samples one is kept by what a text states; 1 where it states nothing of it."""
+    plain = re.sub(r"[;\t|]", " ", text[:_LONGEST])
+    found = _KEPT.search(plain) or _EVERY.search(plain)
+    return int(found["every"]) if found else 1
 
 
 def _rate_of(found: re.Match[str]) -> float | None:

@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -61,7 +61,9 @@ CELSIUS, ICE = ("degC", "°C"), 273.15  # K, their zero
 COUNTS = ("count", "counts", "cts", "cnt", "increment", "increments", "inc", "incs", "digit",
            "digits", "pulses", "ticks", "steps", "LSB")  # fmt: skip
 _RAW = ("V", "mV", *COUNTS, "%", "1")
-_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^· ]{0,30}$")
+_WORD = re.compile(r"^[A-Za-z][A-Za-z0-9_*/^· -]{0,30}$")
+_SEVERAL = re.compile(r"^(\d*\.?\d+(?:[eE][-+]?\d+)?) ?(?=[A-Za-zµμ°])")  # 0.1 um, 100ns
+_WEIGHT = re.compile(r"\b(lb|oz|kg)s?\b")  # of which a force is as large
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "·": "", "*": "", " ": ""})
 
 
@@ -76,7 +78,13 @@ class Unit:
 
 
 def find_unit(text: str, *allowed: str) -> Unit:
-    """The unit ``text`` of quantities with the SI units ``allowed``; InputError suggests one."""
+    """The unit ``text`` of quantities with the SI units ``allowed``; InputError suggests one.
+
+    It may be so many of a unit: "0.1 um".
+    """
+    if several := _SEVERAL.match(text.strip()):
+        one = find_unit(text.strip()[several.end() :], *allowed)
+        return replace(one, size=float(several[1]) * one.size)
     plain = text.translate(_SPELLINGS)
     if plain.endswith(("/s2", "/ms2")):
         plain = plain[:-1] + "^2"
@@ -125,8 +133,11 @@ def _size_by_library(text: str, si: str) -> float | None:
     """One of a rarer unit, such as kip or lbf in, in SI; None where it is of another quantity."""
     if "rad" in si or not _WORD.search(text):  # angles have no dimension there: anything would do
         return None
+    if si.startswith("N"):
+        text = _WEIGHT.sub(r"\1f", text)
+    product = re.sub(r"[· ]+|(?<=[A-Za-z])-(?=[A-Za-z])", "*", text)  # in-lbf
     try:
-        return float(_registry()(re.sub(r"[· ]+", "*", text)).to(si.replace(" ", "*")).magnitude)
+        return float(_registry()(product).to(si.replace(" ", "*")).magnitude)
     except Exception:  # whatever a parser of any text may raise: then it is no unit
         return None
 

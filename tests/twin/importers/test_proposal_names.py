@@ -65,6 +65,14 @@ fm .   .       0x6077
 pm .   .       S-0-0051
 fm .   0       r80[0]
 d  .   0       pid.0.output
+f  lb-in .     Torque [lb-in]
+f  kgf·cm .    Torque (kgf·cm)
+p  arcsec .    Angle [arcsec]
+p  thou .      Position [thou]
+v  0.1_rpm .   Speed [0.1 rpm]
+p  1e-6_m .    Position [1e-6 m]
+p  .   left    Position [left]
+pm .   .       Position [actual]
 ?  .   .       vir
 """
 
@@ -76,7 +84,7 @@ def test_a_name_says_quantity_role_unit_and_axis(line):
     assert found.quantity is SHORT[said[0]]
     if found.quantity is not Quantity.OTHER:
         assert found.role is (SHORT[said[1]] if said[1:] else None)
-        assert found.unit == (None if unit == "." else unit)
+        assert found.unit == (None if unit == "." else unit.replace("_", " "))
         assert found.axis[-1:] == (() if axis == "." else (axis,))
 
 
@@ -100,3 +108,28 @@ def test_words_that_are_written_as_one_are_taken_apart(name, words):
 def test_a_beginning_that_all_names_share_says_nothing():
     names = names_of(["actual_q_0", "actual_qd_0", "actual_current_0"])
     assert [n.role for n in names.values()] == [None, None, None]
+
+
+@pytest.mark.parametrize(
+    ("columns", "units"),
+    [
+        (("position_m", "setpoint_m", "force_N"), ("m", "m", "N")),
+        (("pos_m", "ref_m", "current_a"), ("m", "m", "A")),
+        (("pos_m", "ref_l", "force"), ("m", None, None)),  # l of the load
+    ],
+)
+def test_a_letter_behind_is_a_unit_where_two_of_a_file_are(columns, units):
+    names = names_of(columns)
+    assert tuple(names[c].unit for c in columns) == units
+    assert names[columns[1]].quantity is Quantity.POSITION
+
+
+@pytest.mark.parametrize("shared", ["DeviceId 4/", "Model Error Handler/", "TemperatureTest/"])
+def test_what_all_names_have_in_common_refuses_none(shared):
+    names = names_of([f"{shared}{n}" for n in ("x_meas [m]", "x_ref [m]", "F_cmd [N]")])
+    told = [(n.quantity, n.role) for n in names.values()]
+    asked = SignalRole.ASKED
+    assert told == [
+        (Quantity.POSITION, SignalRole.MEASURED), (Quantity.POSITION, asked),
+        (Quantity.FORCE, asked),
+    ]  # fmt: skip

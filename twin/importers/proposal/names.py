@@ -23,6 +23,7 @@ from twin.importers.proposal.lexicon import (
     Quantity,
     SignalRole,
 )
+from twin.importers.units import is_unit
 
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ω": " omega ", "τ": " tau ", "α": " alpha "})
 _CJK = "\u3040-\u30ff\u3400-\u9fff"
@@ -35,6 +36,7 @@ _SHARE = re.compile(
     r"(?i)^(?:(0[.,]1 ?%|‰|0/00|o/oo|per ?mille?|promille)|%|percent|pct|prozent)"
     r"(?: (?:[a-z]n|of)?(?: ?rated| ?nominal| ?nenn\w*)?(?: ?torque| ?current| ?\w?moment)?)?$"
 )
+_SOME = re.compile(r"\d")  # so many of a unit
 _SQUARED = re.compile(r"(?i)(?:\^?2|²)$")
 _LETTER_OF_AXIS = re.compile(r"^([fmtivpau])([xyz])$")
 AXIS_LETTERS = frozenset("abcxyz")
@@ -179,10 +181,28 @@ def units_of(text: str) -> tuple[tuple[Quantity, str], ...]:
     return ()
 
 
+_KINDS: Mapping[Quantity, tuple[str, ...]] = {
+    Quantity.POSITION: ("m", "rad"), Quantity.VELOCITY: ("m/s", "rad/s"),
+    Quantity.FORCE: ("N", "N m"), Quantity.CURRENT: ("A",), Quantity.OTHER: ("s",),
+}  # fmt: skip
+
+
+def _stated(text: str) -> tuple[tuple[Quantity, str], ...]:
+    """The same of a text in brackets, where a rarer unit, or so many of one, is stated as well."""
+    words = {w for w in words_of(text) if len(w) > 1 and w not in _spellings()}
+    no_unit = words & _known() or not (_SOME.match(text) or len(text) > 1)
+    return units_of(text) or (() if no_unit else _rare(text))
+
+
+@cache
+def _rare(text: str) -> tuple[tuple[Quantity, str], ...]:
+    return tuple((q, text) for q, kinds in _KINDS.items() if is_unit(text, *kinds))
+
+
 def _unit_in(name: str) -> tuple[str, str | None]:
     """The name less its unit, and the unit as written."""
     for found in reversed(list(_BRACKETS.finditer(name))):
-        if units_of(found[1]) or found[1] in ("-", ""):
+        if _stated(found[1]) or found[1] in ("-", ""):
             rest = f"{name[: found.start()]} {name[found.end() :]}".strip()
             return rest, found[1] or None
     tail = _TAIL.search(name)
@@ -209,21 +229,39 @@ def names_of(columns: Sequence[str]) -> dict[str, Name]:
     shared = 0
     while len(split) > 2 and len({tuple(w[: shared + 1]) for w in split if len(w) > shared}) == 1:
         shared += 1
-    return {c: _name(c, frozenset(split[0][:shared]) if split else frozenset()) for c in columns}
+    every = frozenset(split[0][:shared]) if split else frozenset()
+    behind = _ends_in_units(columns)
+    return {c: _name(c, every, behind) for c in columns}
 
 
-def _name(column: str, shared: frozenset[str]) -> Name:
+def _ends_in_units(columns: Sequence[str]) -> bool:
+    """Whether letters behind names are units: two fit what their names say, as position_m, force_N.
+
+    One alone may be that of a motor.
+    """
+    fit = set()
+    for column in columns:
+        bare, written = _unit_in(column)
+        if written and len(written) == 1 and not _BRACKETS.search(column):
+            said = _quantities(words_of(bare))
+            fit |= {written for quantity, _ in units_of(written) if quantity in said}
+    return len(fit) > 1
+
+
+def _name(column: str, shared: frozenset[str], ends_in_unit: bool) -> Name:
     bare, written = _unit_in(column)
     open_ = _BRACKETS.sub(" ", column)
     coded = next((found for found in CODES.items() if re.search(found[0], open_)), None)
     words = words_of(bare) if coded is None else [*coded[1].split(), *_places(column, coded[0])]
-    told = [w for w in words if w not in shared or _quantities([w])]
+    told = [w for w in words if w not in shared]
+    if _quantity(told)[0] is None and not (written and _stated(written)):
+        told = [w for w in words if w not in shared or _quantities([w])]
     last = words_of(_PATH.split(bare)[-1]) if coded is None else words
     quantity, sure = _quantity(last if _quantities(last) else told)
     unit: str | None = None
     if written is not None:
         worded = quantity
-        quantity, unit, kept = _with_unit(quantity, sure, column, written)
+        quantity, unit, kept = _with_unit(quantity, sure, column, written, ends_in_unit)
         sure = sure and quantity is worded
         if not kept:
             told = words = last = words_of(column)
@@ -280,17 +318,18 @@ def _rate_of(quantity: Quantity, words: Sequence[str]) -> Quantity:
 
 
 def _with_unit(
-    quantity: Quantity | None, sure: bool, column: str, written: str
+    quantity: Quantity | None, sure: bool, column: str, written: str, ends_in_unit: bool
 ) -> tuple[Quantity | None, str | None, bool]:
     """Quantity and unit with what the unit tells; False where it is none but part of the name."""
-    may = units_of(written)
-    own = [u for q, u in may if q is quantity]
     bracketed = column.rstrip().endswith(("]", ")", ">", "}"))
+    may = _stated(written) if bracketed else units_of(written)
+    own = [u for q, u in may if q is quantity]
     if quantity is Quantity.OTHER or (quantity in CHANNELS and not own and not _is_raw(may)):
         return quantity, None, True
     if own:
         return quantity, own[0], True
-    if len(written) == 1 and not bracketed and (sure or not written.isupper()):
+    is_letter = len(written) == 1 and not bracketed and not ends_in_unit
+    if is_letter and (sure or not written.isupper()):
         return quantity, None, False  # x_m, pos_A: of a motor, of an axis
     if not may:
         return quantity, None, True
