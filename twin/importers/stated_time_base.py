@@ -16,10 +16,11 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
-from twin.importers.table import SignalTable
+from twin.importers.table import SignalTable, told_apart
 from twin.importers.time_base import (
     order_of,
     parts_of,
+    rate_of,
     rate_of_rounded,
     repeated_rows,
     rows_a_stamp,
@@ -42,6 +43,18 @@ _UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": 
                "usec": "us", "msec": "ms", "nsec": "ns", "sec": "s", "secs": "s", "seconds": "s",
                "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
                "s": "s"}  # fmt: skip
+# Between which numbers a column counts a unit of time since a known day, from 1990 to 2060.
+_CLOCKS = (
+    (3.3e4, 5.9e4, "day", "days of a spreadsheet"),
+    (7.26e5, 7.53e5, "day", "days since the year 0"),
+    *(
+        (size * 6.3e8, size * 2.9e9, unit, f"{unit} since 1970")
+        for unit, size in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9))
+    ),
+    (1.22e17, 1.45e17, "100ns", "100 ns since 1601"),
+    (6.27e17, 6.51e17, "100ns", "100 ns since the year 1"),
+)
+_SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
 _SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _OFF = 0.02  # of a rate or a time, by which two clocks that are one do not differ
 _BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
@@ -75,8 +88,7 @@ class _Times:
     @property
     def step(self) -> float:
         """The usual step, s."""
-        steps = np.diff(self.seconds)
-        return float(np.median(steps[steps > 0.0]))
+        return _usual(np.diff(self.seconds))
 
     @property
     def is_coarse(self) -> bool:
@@ -155,6 +167,8 @@ def counts(name: str, column: Array) -> bool:
     """Whether a column (n,) counts the samples, with gaps or begun again, and tells no time."""
     if _unit_of(name) is not None or (column != np.rint(column)).any() or len(column) < 3:
         return False
+    if _by_clock(column) is not None:
+        return False
     steps = np.diff(_continued(column))
     usual = float(np.median(steps))
     if usual <= 0.0 or (steps <= 0.0).mean() > 0.01 or (steps != usual).mean() > 0.1:
@@ -214,16 +228,44 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
     """The unit of a column of times, and why."""
     if calendar:
         return "s", "dates and times" if len(column) else ""
-    if (unit := _unit_of(name)) is not None:
-        return unit, "its name states the unit"
+    step = _usual_step(column)
+    own = _unit_of(name)
+    if own is not None and 1.0 / (find_unit(own, "s").size * step) < 5.0 * _FASTEST:
+        return own, "its name states the unit"
+    if own is None and (clock := _by_clock(column)) is not None:
+        return clock
+    fits = [u for u, size in _SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
+    unit = fits[0] if fits else own or "s"
+    told = f"that is {_SIZES.get(unit, 1.0) / step:.6g} Hz"
+    if own is not None:
+        told += (
+            f", where the {own} of its name are {1.0 / (find_unit(own, 's').size * step):.6g} Hz"
+        )
+    return unit, told if unit == "s" and own is None else f"unit ASSUMED: {told}"
+
+
+def _usual_step(column: Array) -> float:
     steps = np.diff(_continued(column))
-    rising = steps[steps > 0.0]
-    step = float(np.median(rising)) if len(rising) else 1.0
-    slowest, fastest = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-    fits = [u for u, size in _SIZES.items() if slowest <= size / step <= fastest]
-    unit = fits[0] if fits else "s"
-    told = f"that is {_SIZES[unit] / step:.6g} Hz"
-    return unit, told if _SIZES[unit] == 1.0 else f"unit ASSUMED: {told}"
+    return _usual(steps) if (steps > 0.0).any() else 1.0
+
+
+def _usual(steps: Array) -> float:
+    """The usual step: the mean of those that are like the median one.
+
+    Of a clock that counts since long ago each step is rounded.
+    """
+    middle = np.median(steps[steps > 0.0])
+    return float(np.mean(steps[np.abs(steps - middle) <= 0.1 * middle]))
+
+
+def _by_clock(column: Array) -> tuple[str, str] | None:
+    """The unit of times that count since a known day, and why; None where none is as large."""
+    first, step = float(column[0]), _usual_step(column)
+    for low, high, unit, since in _CLOCKS:
+        rate = 1.0 / (find_unit(unit, "s").size * step)
+        if low < first < high and _SLOWEST <= rate <= _FASTEST:
+            return unit, f"as many {since}, that is {rate:.6g} Hz"
+    return None
 
 
 def _of_times(
@@ -235,14 +277,19 @@ def _of_times(
     lines = []
     coarse = rows_a_stamp(time.seconds)
     if coarse is not None:
-        rows = f"each time of {time.name} is that of {coarse * time.step:.4g} rows"
+        of_each = coarse * time.step
+        if (key := _key(columns, round(of_each))) is not None:
+            return StatedTimeBase((f"# {key}",), 1.0 / coarse, used, (key,))
+        rows = f"each time of {time.name} is that of {of_each:.4g} rows"
         lines.append(f"sample_rate = {coarse:.6g} # Hz: {rows}")
         return StatedTimeBase(tuple(lines), 1.0 / coarse, used)
     if (rounded := rate_of_rounded(time.seconds)) is not None:
         line = f"sample_rate = {rounded:.9g} # Hz: so many rows a second by {time.name}, which is"
         return StatedTimeBase((f"{line} rounded",), 1.0 / rounded, used)
     step = time.step / find_unit(time.unit, "s").size
-    lines.append(f"time = {time.entry} # rises by {step:.6g} {time.unit}: {time.reason}{why}")
+    times = " x " if time.unit[0].isdigit() else " "
+    rises = f"rises by {step:.6g}{times}{time.unit}"
+    lines.append(f"time = {time.entry} # {rises}: {time.reason}{why}")
     lines += [f"# {text}" for text in time.said]
     lines += [f"# or: time = {other.entry} # rises by {other.step:.6g} s"
               for other in found if other is not time and other.duration > 0.0]  # fmt: skip
@@ -257,7 +304,8 @@ def _of_times(
         steps = steps[first - 1 : last - 1]
     again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
     off = np.abs(np.delete(steps, again - 1) - time.step)
-    if len(off) and off.max() > 0.01 * time.step:  # what is less even needs resample
+    whole = len(steps) == len(time.seconds) - 1 and order is None and not len(again)
+    if len(off) and (off.max() > 0.01 * time.step or (whole and not _has_rate(time.seconds))):
         rate = simple_rate(1.0 / time.step)
         spread = f"{steps.min() / time.step * step:.4g} to {steps.max() / time.step * step:.4g}"
         lines.append(
@@ -266,6 +314,24 @@ def _of_times(
     if stated and stated.rate and abs(stated.rate * time.step - 1.0) > _OFF:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
     return StatedTimeBase(tuple(lines), time.step, used)
+
+
+def _key(columns: Mapping[str, Array], rows: int) -> str | None:
+    """That a column tells the rows of one time apart, where it goes through so many values."""
+    for name, column in columns.items():
+        once = column[:rows]
+        if len({*once.tolist()}) == rows > 1 and (column[rows:] == column[:-rows]).all():
+            return told_apart(name, [f"{value:g}" for value in once])
+    return None
+
+
+def _has_rate(times: Array) -> bool:
+    """Whether times (n,) in s are even enough to be imported as they are."""
+    try:
+        rate_of(times)
+    except InputError:
+        return False
+    return True
 
 
 def _best(found: Sequence[_Times]) -> tuple[_Times, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -158,6 +158,14 @@ def numbers(name: str, raw: NDArray) -> Array:
         place = f": {array.flat[row - 1]!r} in row {row}" if row else ""
         raise InputError(f"column '{name}' does not hold one real number a row{place}")
     return array.astype(np.float64)
+
+
+def told_apart(name: str, values: Sequence[str]) -> str:
+    """That rows are of several axes or signals, which a column of that name tells apart."""
+    return (
+        f"column '{name}' tells of what a row is, {' or '.join(values)}: a row must be one sample "
+        "of all; give each its own columns (pandas: pivot), or split the file by it"
+    )
 
 
 def extra(module: str) -> ModuleType:

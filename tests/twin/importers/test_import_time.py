@@ -150,6 +150,25 @@ def test_a_rate_that_the_head_states_is_read(tmp_path, line):
     assert "the file states 250 Hz" in import_notes(other)[0]
 
 
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("Sample rate: 8 kHz", "Decimation: 8"),
+        ("Sampling factor;4", "Basic sampling time;0.25 ms"),
+        ("Current loop cycle time: 62.5 us", "Sampling: every 16th cycle"),
+        ("Zykluszeit 0,25 ms", "jeder 4. Takt"),
+        ("Downsampling factor 2; fs = 2000",),
+        ("Recording gap 10 ms", "fs=1000"),
+        ("Samples: 8000", "Sample rate 1 kHz"),
+    ],
+)
+def test_one_of_so_many_samples_is_kept(lines):
+    """A cycle beside a factor is a product; a gap in ms is none."""
+    stated = stated_rate(lines)
+    assert stated is not None
+    assert stated.rate == pytest.approx(1000.0)
+
+
 def test_words_that_state_no_rate():
     for text in ("Baud rate: 115200", "Frequency: 50 Hz", "Feed rate 100 mm/s", "Messzeit;10;s",
                  "recording time: 12:30:00", "Record Length,2500"):  # fmt: skip
@@ -313,3 +332,31 @@ def test_a_clock_that_was_put_back_names_the_parts(tmp_path):
         import_log(tmp_path / "a.csv", mapping(tmp_path, text))
     part = import_log(tmp_path / "a.csv", mapping(tmp_path, "rows = [401, 600]\n" + text))
     assert len(part) == 200
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "second", "unit"),
+    [
+        ("t", 45328.6, 1.0 / 86400.0, "day"),  # of a spreadsheet
+        ("datenum", 738920.6, 1.0 / 86400.0, "day"),
+        ("t", 1707230038.5, 1.0, "s"),
+        ("t", 1707230038500.0, 1e3, "ms"),  # whole numbers, which count no rows
+        ("stamp", 1.7072300385e18, 1e9, "ns"),
+        ("ticks", 133515432001234560.0, 1e7, "100ns"),  # of Windows
+        ("Time [us]", 0.0, 1.0, "s"),  # as its name says what cannot be: 250 MHz
+    ],
+)
+def test_how_large_times_are_tells_their_unit(tmp_path, name, begin, second, unit):
+    times = begin + second * np.arange(len(Q)) / 250.0
+    lines = [f"{t:.12f},{q:.9g},{f:.9g}" for t, q, f in zip(times, Q, F, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([f"{name},q,f", *lines]))
+    lines = proposed(tmp_path)
+    assert f'time = {{column = "{name}", unit = "{unit}"}}' in lines
+    assert ("unit ASSUMED: that" in lines) == (name == "Time [us]")
+
+
+def test_the_step_of_a_clock_that_counts_since_long_ago_is_the_mean_one(tmp_path):
+    times = 1707230000123456789 + 1_000_000 * np.arange(len(Q))
+    lines = [f"{t},{q:.9g},{f:.9g}" for t, q, f in zip(times, Q, F, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["stamp_ns,q,f", *lines]))
+    assert "rises by 1e+06 ns" in proposed(tmp_path)

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from twin.errors import InputError
 from twin.importers import import_log
+from twin.importers.guess import propose
 from twin.importers.mapping import parse_mapping
 
 MAP = 'time = {column = "t", unit = "s"}\n[axes.x]\nposition = {column = "x", unit = "m"}\n'
@@ -81,3 +83,34 @@ def test_points_in_one_column_and_commas_in_another_are_both_decimal_signs(tmp_p
     log = import_log(path, parse_mapping(MAP))
     assert log.sample_rate == pytest.approx(1e3)
     np.testing.assert_allclose(log.axes["x"].position, X, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "told"),
+    [
+        (
+            "t,axis,x,F",
+            ("{t},X1,{x},{f}", "{t},X2,{x},{f}"),
+            "'axis' tells of what a row is, X1 or",
+        ),
+        ("t,joint,x,F", ("{t},1,{x},{f}", "{t},2,{x},{f}"), "'joint' tells of what a row is, 1 or"),
+        ("t,signal,value", ("{t},x [m],{x}", "{t},F [N],{f}"), r"'signal' tells .* x \[m\] or F"),
+    ],
+)
+def test_rows_of_several_axes_or_signals_are_no_samples(
+    tmp_path: Path, head: str, rows: tuple[str, ...], told: str
+) -> None:
+    """They were woven into one axis at twice the rate, which a check found suitable."""
+    body = [r.format(t=t, x=x, f=f) for t, x, f in zip(T, X, F, strict=True) for r in rows]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join([head, *body]))
+    with pytest.raises(InputError, match=told):
+        asked = propose(path).lacks({})
+        raise InputError(" ".join(asked))
+
+
+def test_a_heartbeat_tells_no_rows_apart(tmp_path: Path) -> None:
+    body = [f"{t},{x},{f},{k % 2 == 0}" for k, (t, x, f) in enumerate(zip(T, X, F, strict=True))]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t,x,F,alive", *body]))
+    assert len(import_log(path, parse_mapping(MAP))) == len(T)

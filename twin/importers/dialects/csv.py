@@ -19,13 +19,14 @@ from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.proposal.names import units_of
 from twin.importers.stamps import is_date, is_stamp
-from twin.importers.table import SignalTable, parsing
+from twin.importers.table import SignalTable, parsing, told_apart
 from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
 from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 _UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
 _WITHOUT_CELLS = 2  # names at the end, such as LabVIEW's comment, that rows may have no cell of
+_FLAGS = {"true", "false", "on", "off", "yes", "no"}  # of a heartbeat
 _SOME = 40  # rows by which the kinds of the columns are told
 
 Rows = Sequence[Sequence[str]]
@@ -60,6 +61,7 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     several = given[0] != width and (given[1] == width or given[0] < width)  # words a name
     names = _names(spaced[header] if several else rows[header], rows[skip])
     units = _units(rows[header + 1 : skip], names)
+    _require_samples(names, rows[skip : skip + _SOME], style)
     return Layout(head.encoding, style, names, skip, some, units, header)
 
 
@@ -176,6 +178,17 @@ def _is_usual(cell: str) -> bool:
     """Whether a cell is a unit as drives and programs write it."""
     unit = cell.strip("[]() ")
     return is_usual_unit(unit) or bool(units_of(unit))
+
+
+def _require_samples(names: Sequence[str], rows: Rows, style: Style) -> None:
+    """Raise InputError where a column goes through the same words again and again."""
+    for name, cells in zip(names, zip(*rows, strict=False), strict=False):
+        once = [*dict.fromkeys(cells)]
+        times, count = 3, len(once)  # that all of them must have come
+        again = count > 1 and len(cells) >= times * count and cells[count:] == cells[:-count]
+        words = {c.lower() for c in once if c and not style.is_number(c) and not is_stamp(c)}
+        if again and len(words) == count and not words <= _FLAGS:
+            raise InputError(told_apart(name, once))
 
 
 def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
