@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -91,9 +92,9 @@ def test_points_in_one_column_and_commas_in_another_are_both_decimal_signs(tmp_p
         (
             "t,axis,x,F",
             ("{t},X1,{x},{f}", "{t},X2,{x},{f}"),
-            "'axis' tells of what a row is, X1 or",
+            "'axis' tells .* is, X1 or X2: a",
         ),
-        ("t,joint,x,F", ("{t},1,{x},{f}", "{t},2,{x},{f}"), "'joint' tells of what a row is, 1 or"),
+        ("t,joint,x,F", ("{t},1,{x},{f}", "{t},2,{x},{f}"), "'joint' tells .* is, 1 or 2: a"),
         ("t,signal,value", ("{t},x [m],{x}", "{t},F [N],{f}"), r"'signal' tells .* x \[m\] or F"),
     ],
 )
@@ -104,9 +105,15 @@ def test_rows_of_several_axes_or_signals_are_no_samples(
     body = [r.format(t=t, x=x, f=f) for t, x, f in zip(T, X, F, strict=True) for r in rows]
     path = tmp_path / "table.csv"
     path.write_text("\n".join([head, *body]))
-    with pytest.raises(InputError, match=told):
-        asked = propose(path).lacks({})
-        raise InputError(" ".join(asked))
+    assert re.search(told, refusal_of(path))
+
+
+def refusal_of(path: Path) -> str:
+    """What is said against a file, as it is read or as a map is proposed."""
+    try:
+        return " ".join(propose(path).lacks({}))
+    except InputError as refused:
+        return str(refused)
 
 
 def test_a_heartbeat_tells_no_rows_apart(tmp_path: Path) -> None:
