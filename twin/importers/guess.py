@@ -66,7 +66,8 @@ class Proposal:
     """What is proposed for a file.
 
     head: the lines before the axes. tail: those behind them, of columns of no axis. holes: by
-    column, where it has no number. timeless: what the file does not tell of its times.
+    column, where it has no number. timeless: what the file does not tell of its times. words: of
+    columns that hold no numbers.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Proposal:
     tail: tuple[str, ...]
     holes: Mapping[str, str]
     timeless: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
 
     def map_text(self, answers: Answers) -> str:
         """The map, with what the user knows."""
@@ -97,7 +99,8 @@ class Proposal:
             for n in self.needs
             if n.entry in PER_ONE and n.key not in answers
         ]
-        return (*self.timeless, *self.holes.values(), *asked, *scales)
+        words = self.words if asked or self.timeless else ()
+        return (*self.timeless, *self.holes.values(), *asked, *scales, *words)
 
     @cached_property
     def rows(self) -> list[ColumnRow]:
@@ -142,7 +145,8 @@ def propose(path: Path) -> Proposal:
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
     tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
     missing = {n: hole for n, hole in holes.items() if n in taken}
-    return Proposal(path.name, file, axes, (head, *stated.lines), tail, missing, stated.missing)
+    lines, words = (head, *stated.lines), tuple(_in_words(table.columns))
+    return Proposal(path.name, file, axes, lines, tail, missing, stated.missing, words)
 
 
 def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
@@ -157,6 +161,14 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
 
 
 _NO_MOTION = "without a position no column is known to be the force that moves it"
+
+
+def _in_words(columns: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """Of each column whose cells have digits and are no numbers, what it holds."""
+    for name, column in columns.items():
+        cell = str(column[0]) if len(column) == 1 and column.dtype.kind in "UO" else ""
+        if any(c.isdigit() for c in cell):
+            yield f"column '{name}' holds text, such as {cell!r}, and no numbers; correct its cells"
 
 
 def _about(name: str, raw: np.ndarray) -> str:

@@ -70,6 +70,8 @@ class Style:
         try:
             return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
         except ValueError:
+            if "\u2212" in cell:  # the minus of typography
+                return self.value(cell.replace("\u2212", "-"))
             if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
                 return self.value(re.sub("[dD]", "e", cell))
             if re.fullmatch(r"[-+]?0[xX][\da-fA-F]+", cell):  # of a register: 0x1A2B
@@ -282,15 +284,16 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
         raise InputError(_of_text(layout, *next(iter(text.items()))))
     where = [k for name, k in places.items() if name not in text]
     cut = mapping.rows is not None  # what is no number may be in the others
-    read, more = _rows(path, layout, where, every=cut or not asked)
+    read, more, in_line = _rows(path, layout, where, every=cut or not asked)
     said = (*layout.said, *more)
+    first_line = layout.skip + 1 if in_line else None
     for k in text.values():
         first = next((row[k] for row in layout.rows if k < len(row)), "")
         read[k] = np.array([first])
     columns = {name: read[k] for name, k in places.items()}
     columns = {n: c for n, c in joined_with_dates(columns).items() if n in wanted}
     above = tuple(_head_lines(path, layout))
-    return SignalTable(columns, layout.sample_rate, layout.start_ns, layout.skip + 1, said, above)
+    return SignalTable(columns, layout.sample_rate, layout.start_ns, first_line, said, above)
 
 
 def _of_text(layout: Layout, name: str, column: int) -> str:
@@ -320,8 +323,10 @@ def _dates_of(wanted: Iterable[str], layout: Layout, names: Sequence[str]) -> di
 
 def _rows(
     path: Path, layout: Layout, where: Sequence[int], every: bool
-) -> tuple[dict[int, NDArray], tuple[str, ...]]:
+) -> tuple[dict[int, NDArray], tuple[str, ...], bool]:
     """The columns at some places, and sentences about the lines that are no rows.
+
+    Last, whether each line up to the last row is a row, so that one's number tells the other's.
 
     every: all are read, to be looked at or cut, so that what is no number is NaN there. Raises
     InputError that names all bad cells.
@@ -333,7 +338,9 @@ def _rows(
     bad, left_out = rows.bad, rows.bad.left_out()
     if not every or bad.has_header or any(k in bad.columns for k in rows.stamps):
         bad.require_none(left_out)
-    return rows.columns(left_out.rows), left_out.said
+    kept = rows.columns(left_out.rows)
+    in_line = rows.blank == 0 and all(k >= rows.count - len(left_out.rows) for k in left_out.rows)
+    return kept, left_out.said, in_line
 
 
 class _Rows:
@@ -349,6 +356,7 @@ class _Rows:
         self.bad = BadCells(layout.names, len(layout.names))
         self._type = np.dtype([(str(k), "i8" if k in self.stamps else "f8") for k in where])
         self._blocks: list[NDArray] = []
+        self.blank = self.count = 0  # lines that are no rows, and rows
 
     def add(self, block: Sequence[tuple[int, str]]) -> None:
         """Read some lines, each with its number."""
@@ -358,6 +366,8 @@ class _Rows:
         else:
             self.bad.pass_rows(len(values))
         self._blocks.append(values)
+        self.count += len(values)
+        self.blank += len(block) - len(values)
 
     def columns(self, left_out: Sequence[int]) -> dict[int, NDArray]:
         """The columns (n,) without some rows."""

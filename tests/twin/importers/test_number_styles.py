@@ -46,6 +46,7 @@ def spaced(sign: str) -> Callable[[str], str]:
         (";", ".3f", ",.1f", spaced("\u202f")),  # of France
         (";", ".3f", ",.1f", spaced("’")),
         (";", ".5g", ",.1f", comma),
+        (",", ".5g", ".1f", lambda text: text.replace("-", "\u2212")),
     ],
 )
 def test_a_table_is_read_as_it_was_written(
@@ -121,3 +122,26 @@ def test_a_heartbeat_tells_no_rows_apart(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("\n".join(["t,x,F,alive", *body]))
     assert len(import_log(path, parse_mapping(MAP))) == len(T)
+
+
+@pytest.mark.parametrize(
+    ("between", "where"), [([], r"row 1001 of 2000 \(line 1002\)"), (["", "# mark"], "row 1001 of")]
+)
+def test_a_line_is_told_where_its_number_is_known(
+    tmp_path: Path, between: list[str], where: str
+) -> None:
+    """Behind a comment a row has not the number of its line any more: the row is told."""
+    rows = [f"{t},{x},{f}" for t, x, f in zip(T, X, F, strict=True)]
+    rows[1000] = "1.0,0.1,nan"
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t,x,F", *rows[:500], *between, *rows[500:]]))
+    said = refusal_of(path)
+    assert re.search(where, said)
+    assert ("line" in said) == (not between)
+
+
+def test_columns_of_words_are_told_where_a_signal_is_looked_for(tmp_path: Path) -> None:
+    rows = [f"{t},{x},{f}%" for t, x, f in zip(T, X, F, strict=True)]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t,x,Torque", *rows]))
+    assert "column 'Torque' holds text, such as '2345.0%', and no numbers" in refusal_of(path)

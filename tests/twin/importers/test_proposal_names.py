@@ -65,6 +65,7 @@ fm .   .       0x6077
 pm .   .       S-0-0051
 fm .   0       r80[0]
 d  .   0       pid.0.output
+?  .   .       Í
 f  lb-in .     Torque [lb-in]
 f  kgf·cm .    Torque (kgf·cm)
 p  arcsec .    Angle [arcsec]

@@ -182,7 +182,7 @@ def _by_motion(
     if len(candidates) > 1:  # what goes as the position may be a spring's, where nothing else is
         told = [c for c in told if not file.course(position, c.name)]
     if not told:
-        what = f"no column of {', '.join(axis.columns)} looks like a force"
+        what = f"no column{axis.among} looks like a force"
         return axis.asking({"force": f"axis {axis.name}: {what}"})
     named = [c for c in told if c.name.quantity is not None] or told
     groups = distinct([file.column(c.name) for c in named])

@@ -28,6 +28,7 @@ from twin.importers.units import is_unit
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ω": " omega ", "τ": " tau ", "α": " alpha "})
 _CJK = "\u3040-\u30ff\u3400-\u9fff"
 _TOKENS = re.compile(rf"[{_CJK}]+|[a-z]+|\d+")
+_LONE = re.compile(r"(?<![^\W\d_])[À-ÖØ-öø-ÿ](?![^\W\d_])")  # of Russian read as of the West
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 _PATH = re.compile(r"[./:](?=[^./:]*[^\W\d_]{2})")
 _TAIL = re.compile(r"(?:\s+in\s+|[_ ,/.]\s*)([A-Za-zµμ°%²]+(?:[_/][A-Za-z]+[2²]?)?)$")
@@ -95,6 +96,7 @@ def _known() -> frozenset[str]:
 def words_of(text: str) -> list[str]:
     """The words of a name, in lower case; words written as one are taken apart."""
     plain = unicodedata.normalize("NFKC", text).translate(_GREEK).replace("ß", "ss")
+    plain = _LONE.sub(" ", plain)
     parts = unicodedata.normalize("NFKD", plain)
     plain = unicodedata.normalize("NFC", "".join(c for c in parts if not _is_accent(c)))
     spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", plain)

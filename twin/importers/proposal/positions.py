@@ -77,7 +77,7 @@ def _by_course(file: File, axis: ProposedAxis) -> ProposedAxis:
     if found := _that_drives(file, free, drives):
         return axis.having(found)
     asked = [n for n in file.some(axis.free, Quantity.POSITION) if n.role is SignalRole.ASKED]
-    what = f"no column of {', '.join(axis.columns)} looks like a position"
+    what = f"no column{axis.among} looks like a position"
     if asked:
         what = f"{asked[0].column} is a setpoint; no column looks like the measured position"
     return axis.asking({"position": f"axis {axis.name}: {what}"})

@@ -64,6 +64,11 @@ class ProposedAxis:
     sign: int = 1
     comes_round: bool = False
 
+    @property
+    def among(self) -> str:
+        """Among which columns something was looked for, as part of a sentence."""
+        return f" of {', '.join(self.columns)}" if self.columns else " of numbers"
+
     def having(self, *signals: Signal) -> ProposedAxis:
         """The same with these signals too."""
         return replace(self, signals={**self.signals, **{s.field: s for s in signals}})
