@@ -297,9 +297,9 @@ def _of_times(
     steps = np.diff(time.seconds if order is None else time.seconds[order])
     if order is None and len(parts := parts_of(time.seconds)) > 1:
         first, last = max(parts, key=lambda part: part[1] - part[0])
-        told = " or ".join(f"[{a}, {b}]" for a, b in parts if b > a != first)
+        told = " and ".join(f"[{a}, {b}]" for a, b in parts if b > a != first)
         lines.append(
-            f"rows = [{first}, {last}] # the longest part; between them is nothing: {told}"
+            f"rows = [{first}, {last}] # the longest of {len(parts)} parts; the others: {told}"
         )
         steps = steps[first - 1 : last - 1]
     again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)

@@ -203,11 +203,14 @@ def _require_finite(time: Array) -> None:
 
 
 def parts_of(time: Array) -> list[tuple[int, int]]:
-    """The first and the last row, from 1, of each part of times (n,) in s with a hole between."""
+    """The first and the last row, from 1, of each part of times (n,) in s.
+
+    Between two is a hole, or the clock begins again.
+    """
     steps = np.diff(time)
     longest = 20.0  # usual steps, over which a line is no measurement
     usual = float(np.median(steps)) if len(steps) else 0.0
-    holes = np.flatnonzero(steps > longest * usual) + 1 if usual > 0.0 else []
+    holes = np.flatnonzero(np.abs(steps) > longest * usual) + 1 if usual > 0.0 else []
     return _parts(holes, len(time))
 
 

@@ -293,7 +293,7 @@ def test_times_that_are_late_and_never_early_are_times_though_no_name_says_so(tm
     np.savetxt(tmp_path / "a.csv", table, delimiter="\t", fmt="%.9g")
     text = guess_map(tmp_path / "a.csv").text
     assert 'time = {column = "1", unit = "ms"}' in text
-    assert "rows = [41, 600] # the longest part; between them is nothing: [1, 3] or [4, 40]" in text
+    assert "rows = [41, 600] # the longest of 3 parts; the others: [1, 3] and [4, 40]" in text
     assert "resample = 100 " in text
 
 
@@ -360,3 +360,13 @@ def test_the_step_of_a_clock_that_counts_since_long_ago_is_the_mean_one(tmp_path
     lines = [f"{t},{q:.9g},{f:.9g}" for t, q, f in zip(times, Q, F, strict=True)]
     (tmp_path / "a.csv").write_text("\n".join(["stamp_ns,q,f", *lines]))
     assert "rises by 1e+06 ns" in proposed(tmp_path)
+
+
+def test_of_a_recording_with_a_gap_that_begins_again_the_longest_part_is_taken(tmp_path):
+    """The rows of the others are those of the file, so that they can be taken as they are told."""
+    times = np.concatenate([T[:100], T[300:450], T[:200]])
+    cells = zip(times, Q[: len(times)], F[: len(times)], strict=True)
+    lines = [f"{t:.3f},{q:.9g},{f:.9g}" for t, q, f in cells]
+    (tmp_path / "a.csv").write_text("\n".join(["time [s],q,f", *lines]))
+    told = "rows = [251, 450] # the longest of 3 parts; the others: [1, 100] and [101, 250]"
+    assert told in proposed(tmp_path)
