@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from check_drive import command, drive, findings, motion
+from check_drive import command, drive, findings, motion, stated
 
 from twin.checks import Fault, Severity, check_log
 from twin.logs import FIELDS, LINEAR_UNITS, ROTARY_UNITS, AxisLog, Log
@@ -135,6 +135,22 @@ def test_a_channel_that_is_late_is_told_with_the_remedy(rate, name, late, severi
     assert found[0].remedy.startswith(f"give {remedied} delay_samples = {round(samples)} in")
     assert ("dead time" in found[0].remedy) == (name == "force" and severity is WARNING)
     assert found[0].severity is severity
+
+
+@pytest.mark.parametrize("late", [4e-3, 12e-3])
+def test_how_late_a_force_is_is_told_by_motion_that_goes_on(late):
+    """Moves of 0.15 s that stop gently, and a force that breaks them loose 20 ms before."""
+    rng, velocity, dry = np.random.default_rng(1), [], []
+    for size in rng.uniform(0.3, 1.0, 24) * rng.choice([-1.0, 1.0], 24):
+        velocity.append(np.r_[np.zeros(100), 0.3 * size * np.sin(np.pi * np.arange(150) / 150) ** 2])
+        dry.append(np.sign(size) * (np.arange(250) >= 80))
+    v = np.concatenate(velocity)
+    x = (np.cumsum(v) - 0.5 * v) / RATE + 1e-8 * rng.standard_normal(len(v))
+    asked = 2.5 * np.gradient(v) * RATE + 0.5 * np.concatenate(dry) + 2.0 * v
+    n = np.arange(len(v))
+    force = np.interp(n + 0.5 - late * RATE, n, asked)  # held over the sample
+    (found,) = findings(Log(RATE, {"x": AxisLog({"position": x, "force": force})}), Fault.LAG)
+    assert stated(found, "the force is ") == pytest.approx(late * 1e3, abs=0.03)
 
 
 @pytest.mark.parametrize(("what", "beside"), [("force", 4), ("position", 0)])

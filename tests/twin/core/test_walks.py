@@ -1,5 +1,7 @@
 """Walks of the laws along a motion agree: for several sets of parameters, for columns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from machines import CATALOGUE
@@ -10,7 +12,24 @@ from identify.dataset.prepared_log import total_force, total_forces
 from twin.core.native import Table, build_table
 from twin.core.settling import settle
 from twin.core.walks import averaged_columns, reading_columns, walk, walk_sensing
-from twin.effect import Effect, Kind
+from twin.effect import (
+    A_OTHER,
+    DT,
+    INDEX,
+    MOVED,
+    OUT,
+    PRESSURE,
+    TIME,
+    V_OTHER,
+    WHEN,
+    X_OTHER,
+    Effect,
+    Kind,
+    Parameter,
+    U,
+    V,
+    X,
+)
 from twin.model.machine import AxisModel, Fitted, axis_table
 from twin.signals import Array
 
@@ -90,6 +109,31 @@ def test_all_effects_together_give_the_sum_of_each(effect: Effect) -> None:
 def test_no_effects_give_no_force() -> None:
     table = axis_table({"": AxisModel(5.0)})
     assert not total_forces(table, table.parameters[None], motion()).any()
+
+
+def reads(p, s, io):
+    io[OUT] = io[int(p[0])]
+
+
+READS = Effect(
+    Kind.FORCE, "s", "F", "none", (Parameter("slot", "1", 0.0, 0.0, 99.0, "m"),), reads, "f", "e"
+)
+
+
+@pytest.mark.parametrize("slot", [INDEX, TIME, DT, X, V, U, X_OTHER, V_OTHER, A_OTHER, WHEN, MOVED,
+                                  PRESSURE, PRESSURE + 1, PRESSURE + 2])  # fmt: skip
+def test_a_law_reads_what_each_sample_brings(slot: int) -> None:
+    along, n = motion(), np.arange(N)
+    along = replace(along, others=np.vstack([along.others, along.others[::-1] + 7.0]))
+    table = axis_table({"": AxisModel(5.0, effects=(Fitted.at_start(READS, {"slot": slot}),))})
+    brought = {
+        INDEX: n, TIME: 0.013 + PERIOD * n, DT: PERIOD + 0.0 * n, WHEN: 0.5 + 0.0 * n,
+        MOVED: 5.0 + 0.0 * n, **dict(zip((X, V, U), along.signals, strict=True)),
+        **dict(zip((X_OTHER, V_OTHER, A_OTHER), along.others[:3], strict=True)),
+        **{PRESSURE + i: along.others[3 + i] for i in range(3)},
+    }  # fmt: skip
+    for found in (by_effect(table, along), total_force(table, along)):
+        np.testing.assert_allclose(found, brought[slot], rtol=1e-15)
 
 
 COLUMNS = [e for e in CATALOGUE.values() if e.columns]
