@@ -142,7 +142,8 @@ def test_how_late_a_force_is_is_told_by_motion_that_goes_on(late):
     """Moves of 0.15 s that stop gently, and a force that breaks them loose 20 ms before."""
     rng, velocity, dry = np.random.default_rng(1), [], []
     for size in rng.uniform(0.3, 1.0, 24) * rng.choice([-1.0, 1.0], 24):
-        velocity.append(np.r_[np.zeros(100), 0.3 * size * np.sin(np.pi * np.arange(150) / 150) ** 2])
+        move = np.sin(np.pi * np.arange(150) / 150) ** 2
+        velocity += [np.zeros(100), 0.3 * size * move]
         dry.append(np.sign(size) * (np.arange(250) >= 80))
     v = np.concatenate(velocity)
     x = (np.cumsum(v) - 0.5 * v) / RATE + 1e-8 * rng.standard_normal(len(v))

@@ -281,6 +281,10 @@ REFUSED = {
     "span": (Passes("y", 0.01, 0.1, 1), CannotRun, r"axis y is not held over half of 0\.01 m"),
     "endless": (Passes("x", 0.1, 0.1, 10**12), CannotRun, "change the duration, the repeats"),
     "no motion": (Moves(1, dwell=0.0), InputError, "duration 0 s"),
+    **{
+        f"long {type(e).__name__}": (e, CannotRun, "^duration 100000 s at 2000 Hz is 2e.08 samples")
+        for e in (OpenLoopSine("x", 1e5), Tracking(1e5), Moves(3, duration=1e5))
+    },
     "effort": (Passes("x", 0.1, 0.1, 1, effort=1.01), InputError, "effort = 1.01"),
     "axis": (Passes("z", 0.1, 0.1, 1), InputError, "x, y"),
     "period": (OpenLoopSine("x", 1.0, period=5e-4), InputError, "at least 0.001 s"),

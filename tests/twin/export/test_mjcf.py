@@ -11,7 +11,7 @@ from cli_runs import refusal, twin
 
 from twin.export.formats.mjcf import attributes_of, export
 from twin.model.file import save_model
-from twin.model.machine import AxisIntervals, AxisModel, Fitted, MachineModel
+from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
 
 COMMENTED = ARM.replace(
     '<joint name="elbow"', "<!-- <joint name='elbow'/> as drawn -->\n          <joint name='elbow'"
@@ -176,6 +176,61 @@ def test_what_is_lost_is_told_in_newtons_on_a_log():
     (nearly,) = made.approximated
     assert (nearly.axis, nearly.part) == ("elbow", "spring")
     assert attributes_of(own.axes["elbow"])["stiffness"] == 1.0
+
+
+@pytest.mark.parametrize("k3", [0.0042, 0.0046, 0.42, 0.45])
+def test_a_spring_that_bends_is_held_nearly_up_to_half_of_it(k3):
+    """And not worth a word up to a hundredth."""
+    t = np.arange(4000) * 2.0 * np.pi / 500.0
+    log = arm_of(np.stack([1.7 * np.sin(t)] * 3, axis=1), np.zeros((4000, 3)))
+    spring = fitted("spring", k1=1.0, k3=k3)
+    held = export(model(elbow=spring), {"run": log}).axes["elbow"]
+    x = 1.7 * np.sin(t)
+    left, size = (float(np.sqrt(np.mean(f**2))) for f in (k3 * x**3, x + k3 * x**3))
+    told = f"{left:.2g} of its {size:.2g} N m RMS are lost on run"
+    nearly, lost = ([r.text for r in said] for said in (held.approximated, held.lost))
+    assert ("spring" in held.kept) is (left < 0.01 * size)
+    assert nearly == [told] * (0.01 * size < left < 0.5 * size)
+    assert lost == [told] * (left > 0.5 * size)
+
+
+def test_without_a_log_it_is_told_on_a_sine_over_the_travel():
+    hardware = Hardware(travel=(-0.1, 0.3), velocity=0.5)
+    axis = AxisModel(1.0, hardware, (fitted("spring", middle=0.1, k1=2.0, k3=90.0),))
+    made = export(MachineModel("slide", {"x": axis}, 1000.0, DRIVEN, "slide.xml"), {})
+    y = 0.2 * np.sin(np.linspace(0.0, 25.0, 10_000))
+    left, size = (float(np.sqrt(np.mean(f**2))) for f in (90.0 * y**3, 2.0 * y + 90.0 * y**3))
+    (lost,) = made.lost
+    assert lost.text == f"{left:.2g} of its {size:.2g} N RMS are lost on a sine over its travel"
+
+
+STAYS = "which no effect of the model holds, stays"
+SOFT = COMMENTED.replace("<joint name='elbow' axis", "<joint name='elbow' stiffness='2e-3' axis")
+
+
+@pytest.mark.parametrize(
+    ("more", "armature", "stiffness"),
+    [
+        ({}, f"0.5 kg m^2, {STAYS}", f"0.002 N m/rad, {STAYS}"),
+        ({"base": fitted("rotor_inertia", inertia=0.4), "elbow": fitted("spring", k1=1e-3)},
+         "0.5 kg m^2 becomes 0.4 kg m^2", "0.002 N m/rad becomes 0.001 N m/rad"),
+        ({"base": fitted("rotor_inertia", inertia=0.5), "elbow": fitted("spring", k1=2e-3)},
+         None, None),
+    ],
+)  # fmt: skip
+def test_what_is_another_in_the_file_is_told_however_little(more, armature, stiffness):
+    assert SOFT != COMMENTED
+    said = {f"{r.axis} {r.part}": r.text for r in export(model(SOFT, **more), {}).written}
+    assert said.pop("base armature", None) == armature
+    assert said.pop("elbow stiffness", None) == stiffness
+    assert said == {
+        "base damping": "7 N m s/rad becomes 0.3 N m s/rad",
+        "base frictionloss": "2 N m becomes 0.8 N m",
+        "shoulder damping": "0 N m s/rad becomes 0.2 N m s/rad",
+        "shoulder frictionloss": "0 N m becomes 0.4 N m",
+        "elbow damping": "0 N m s/rad becomes 0.05 N m s/rad",
+        "elbow frictionloss": "0 N m becomes 0.1 N m",
+    }
 
 
 def test_the_command_writes_the_file_that_it_is_given(tmp_path):

@@ -229,6 +229,19 @@ def test_what_is_wrong_with_several_files_is_said(tmp_path, change, message):
         import_log(paths, mapping(tmp_path, TWO.replace(*change)))
 
 
+def test_each_file_has_its_own_format_and_rows_or_those_of_the_map(tmp_path):
+    columns = {"q": np.arange(9.0)}
+    write_csv(tmp_path / "a.one", columns)
+    (tmp_path / "b.two").write_text(json.dumps({n: c.tolist() for n, c in columns.items()}))
+    files = "[[files]]\nsample_rate = 500.0\nrows = [3, 8]\n"
+    files += '[[files]]\nsample_rate = 500.0\nformat = "json"\noffset = 4e-3\n'
+    text = 'format = "csv"\n' + files + TWO[TWO.index("[axes.x]") :]
+    log = import_log([tmp_path / "a.one", tmp_path / "b.two"], mapping(tmp_path, text))
+    assert log.sample_rate == 500.0
+    np.testing.assert_allclose(log.axes["x"].position, 1e-3 * np.arange(4.0, 8.0))
+    np.testing.assert_allclose(log.axes["x"].force, np.arange(4.0))
+
+
 @pytest.mark.parametrize("stated", ["", 'delimiter = ","\n'])
 def test_a_file_may_be_one_column_alone(tmp_path, stated):
     paths = write_two(tmp_path)

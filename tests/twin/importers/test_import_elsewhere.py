@@ -87,6 +87,21 @@ def test_two_scopes_begin_when_each_says_that_it_did(tmp_path):
     assert log.metadata["start_time_unix_ns"] == str(EPOCH * 10**9 + 5 * 10**6)
 
 
+@pytest.mark.parametrize(("step", "rate"), [("0.25", 4000.0), ("8", 125.0), ("0", None)])
+def test_the_rate_of_a_scope_is_that_of_its_sample_time(tmp_path, step, rate):
+    text = scope(shared=True, decimal=".").replace("[ms]\t1\t1", f"[ms]\t{step}\t{step}")
+    (tmp_path / "a.csv").write_text(text)
+    other = map_of("MAIN.fPos", "MAIN.fForce", clock="sample_rate = 1000.0")
+    if rate is None:  # which is none
+        with pytest.raises(InputError, match="does not state its sample rate"):
+            imported(tmp_path, "a.csv", SCOPE_MAP)
+        assert imported(tmp_path, "a.csv", other).sample_rate == 1000.0
+        return
+    assert imported(tmp_path, "a.csv", SCOPE_MAP).sample_rate == rate
+    with pytest.raises(InputError, match=f"is sampled at {rate:g} Hz, the map says 1000 Hz"):
+        imported(tmp_path, "a.csv", other)
+
+
 def test_channels_of_two_sample_times_are_refused(tmp_path):
     (tmp_path / "a.csv").write_text(scope(shared=False, step="2"))
     with pytest.raises(InputError, match="sample times of 1, 2 ms"):

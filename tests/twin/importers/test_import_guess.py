@@ -386,6 +386,20 @@ def test_units_below_the_names_may_be_those_of_a_drive(tmp_path, position, rate,
         assert told is None
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("ref_pos [mm]", 'unit = "mm"} # .*; but one of it is 0.2599 of the position: correct'),
+        ("ref_pos", 'unit = "counts"} # .*; counts_per_metre NOT KNOWN, one of it is 0.2599 of'),
+        ("ref_pos [counts]", "counts_per_metre NOT KNOWN, one of it is 0.2599 of"),
+    ],
+)
+def test_a_setpoint_of_another_size_says_how_much_one_of_it_is(tmp_path, name, said):
+    columns = {"t": T, "pos [mm]": 1e3 * REACHED, name: 3.7e3 * GOAL, "F [N]": PUSH}
+    write_csv(tmp_path / "a.csv", columns)
+    assert re.search(rf"setpoint_position = .*{said}", guess_map(tmp_path / "a.csv").text)
+
+
 def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tmp_path):
     """A setpoint that comes later than its position is none by the numbers."""
     later = np.concatenate([np.zeros(2), REACHED[:-2]])

@@ -9,6 +9,7 @@ from import_cases import mapping, write_csv
 
 from twin.errors import InputError
 from twin.importers import import_log, load_mapping
+from twin.importers.mapping import PER_ENCODER
 from twin.importers.units import find_unit
 
 GOOD = """
@@ -80,6 +81,36 @@ def test_a_wrong_map_is_refused_in_one_line(tmp_path: Path, text: str, message: 
         mapping(tmp_path, text)
     assert "map.toml" in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+RATE, AXIS, MM, VOLTS = "sample_rate = 1000.0", "[axes.x]", '"mm"', '"V", scale = 35.0'
+BOUNDS = {
+    "sample_rate": (RATE, "sample_rate = ?", 1e-3, 0.0),
+    "resample": (RATE, 'resample = ?\ntime = {column = "t", unit = "s"}', 1e-3, 0.0),
+    "step": (RATE, 'time = {column = "n", step = ?}', 1e-6, 0.0),
+    "header_line": (AXIS, f"header_line = ?\n{AXIS}", 1, 0),
+    "rows": (AXIS, f"rows = [?, 50]\n{AXIS}", 1, 0),
+    "force_constant": (AXIS, f"{AXIS}\nforce_constant = ?", 1e-3, 0.0),
+    **{name: (MM, f'"counts", {name} = ?', 0.5, 0.0) for name in PER_ENCODER},
+    **{f"{name} of an axis": (f'{AXIS}\nposition = {{column = "q", unit = {MM}',
+                              f'{AXIS}\n{name} = ?\nposition = {{column = "q", unit = "counts"',
+                              0.5, 0.0) for name in PER_ENCODER},
+    "wraps": (MM, f"{MM}, wraps = ?", 0.5, 0.0),
+    "earliest": (MM, f"{MM}, delay_samples = ?", -1_000_000, -1_000_001),
+    "latest": (MM, f"{MM}, delay_samples = ?", 1_000_000, 1_000_001),
+    "file": (MM, f"{MM}, file = ?", 1, 0),
+    "files": (MM, f"{MM}, file = ?", None, 1001),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("entry", BOUNDS)
+def test_a_number_is_taken_to_its_bound_and_not_beyond(tmp_path: Path, entry: str) -> None:
+    old, new, allowed, refused = BOUNDS[entry]
+    text = replaced(old, new).replace(VOLTS, '"N m"' if "turn" in entry else '"N"')
+    if allowed is not None:
+        mapping(tmp_path, text.replace("?", str(allowed)))
+    with pytest.raises(InputError, match=rf"{refused}\b.*: give "):
+        mapping(tmp_path, text.replace("?", str(refused)))
 
 
 def test_a_missing_map_is_named(tmp_path: Path) -> None:

@@ -217,6 +217,13 @@ def test_an_imported_log_says_what_its_signals_contradict(changed, said):
     assert bool(found) is bool(said)
 
 
+@pytest.mark.parametrize(("begins", "said"), [("x.current", False), ("y.x", True)])
+def test_of_an_axis_whose_counter_begins_again_nothing_else_is_said(begins, said):
+    turned = AxisLog({**SIGNALS, "force": -SERVO.force})
+    log = Log(RATE, {"x": turned}, metadata={f"counter.{begins}": "column 'i' jumps by 65536"})
+    assert bool(doubts_as_metadata(log)) is said
+
+
 # What columns say of each other, of signals that are known exactly
 
 ROWS = np.arange(6000.0)
