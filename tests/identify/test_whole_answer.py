@@ -12,9 +12,10 @@ import pytest
 from cli_runs import refusal, twin
 from planted_logs import RATE, SLIDE, Ride, begun, few, having, logged
 
+from identify import add_found
 from identify.selection.diagnosis import AxisDiagnosis, diagnose_axis
 from identify.workflow import fit
-from twin.logs import read_log, write_log
+from twin.logs import Log, read_log, write_log
 from twin.model.file import load_model, save_model
 from twin.model.machine import AxisModel, MachineModel
 
@@ -52,6 +53,24 @@ def test_every_law_of_the_final_model_belongs_to_a_finding(name: str) -> None:
     assert beyond(found) == {f.effect for f in found.findings} == {*found.named}
     assert {"cogging", "payload_mass"} <= {*found.named}
     assert found.final.error < 0.03 * found.base.error
+
+
+@pytest.mark.parametrize("there", ["xy", "x", "y"])
+def test_all_that_was_found_is_kept_where_the_logs_prefer_it_on_every_axis(there: str) -> None:
+    plain, found = replace(SLIDE, mass=5.3), machine(5.3, cogging=COGGING)
+    base, grown = (MachineModel("m", {"x": a, "y": a}, RATE) for a in (plain, found))
+    logs = []
+    for first in (1, 3):
+        rides = {a: logged(found if a in there else plain, Ride(first, 4.0)) for a in "xy"}
+        logs.append(Log(RATE, {a: log.axes["x"] for a, log in rides.items()}))
+    made = add_found(grown, base, *logs, catalogue=few("coulomb_viscous", "cogging"))
+    assert made.kept is (there == "xy")
+    assert [(s.axis, s.effect, s.action) for s in made.steps] == [
+        (axis, "cogging", "add") for axis in "xy"
+    ]
+    for step in made.steps:
+        assert (step.holdout_error_after < 0.1 * step.holdout_error_before) is (step.axis in there)
+        assert (step.fit_error_after < 0.1 * step.fit_error_before) is (step.axis in there)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -9,11 +9,13 @@ import subprocess
 import sys
 from pathlib import Path
 from time import sleep
+from urllib.error import HTTPError
+from urllib.request import HTTPCookieProcessor, Request, build_opener, urlopen
 
 import pytest
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
-from app_runs import asked
+from app_runs import asked, served
 from planted_logs import SLIDE, having
 
 from identify.app import jobs as queue
@@ -23,6 +25,7 @@ from identify.app.jobs import Jobs
 from identify.app.server import STATIC, Server, application
 from identify.app.state import model_of
 from identify.project.folder import Folder
+from identify.project.history import commands
 from twin.errors import InputError
 from twin.model.file import save_model
 from twin.model.machine import AxisIntervals, MachineModel
@@ -53,6 +56,23 @@ def test_the_token_opens_it_once_and_a_cookie_keeps_it_open(app):
     assert page.status == 200
     assert page.headers["content-security-policy"] == POLICY
     assert page.headers["cache-control"] == "no-store"
+
+
+def test_the_command_serves_a_project_that_it_begins(tmp_path):
+    """And whoever lacks its token is refused; an upload is of --upload MB at most."""
+    folder = tmp_path / "new"
+    with served(folder, "--upload", "1") as address:
+        page, _, token = address.partition("?token=")
+        opener = build_opener(HTTPCookieProcessor())
+        assert b"<html" in opener.open(address).read()
+        with pytest.raises(HTTPError, match="403"):
+            urlopen(page)
+        to = {"url": f"{page}api/upload/a.csv", "method": "PUT", "headers": {"origin": page[:-1]}}
+        assert opener.open(Request(data=b"1" * 10**6, **to)).status == 200
+        with pytest.raises(HTTPError, match="400"):
+            opener.open(Request(data=b"1" * (10**6 + 1), **to))
+    assert len(token) > 20
+    assert commands(Folder(folder)) == ["twin project init"]
 
 
 @pytest.mark.parametrize(

@@ -325,6 +325,20 @@ def test_the_strongest_line_has_its_frequency_and_its_share_of_the_variance(heig
     assert true / 2.0 < share + 1e-3 < 1.5 * true + 2e-3
 
 
+@pytest.mark.parametrize("spacing", ["even", "uneven"])
+def test_the_transform_has_the_whole_share_of_a_sine_of_its_own_frequencies(spacing):
+    """One each 2.5; between two of them Hann's window passes two thirds of its power."""
+    x = np.linspace(0.0, 0.4, 4000)
+    if spacing == "uneven":
+        x = np.sort(np.random.default_rng(3).uniform(0.0, 0.4, 4000))
+    asked = 137.0 + 0.25 * np.arange(10)
+    records = [ScatteredSignal(x, 3.0 * np.sin(2.0 * np.pi * f * x + 0.4)) for f in asked]
+    found, shares = np.transpose([strongest_line(r, 20.0, 400.0, 100.0) for r in records])
+    np.testing.assert_allclose(found, asked, atol=0.075)
+    assert shares.max() == pytest.approx(1.0, abs=0.005)
+    assert shares.min() == pytest.approx(0.71, abs=0.03)
+
+
 def test_the_velocity_without_the_encoders_own_periods_is_that_of_the_motion():
     rate, period = 4000.0, 2e-3
     t = np.arange(12_000) / rate

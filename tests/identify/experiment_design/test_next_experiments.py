@@ -20,6 +20,17 @@ def test_of_one_explanation_and_of_none_no_experiment_is_asked() -> None:
         assert next_experiments({"x": found}, made.MODEL) == ({}, {})
 
 
+def test_it_lasts_ten_seconds() -> None:
+    """As the first experiment tells that a machine which hardly moves cannot run."""
+    model = made.MODEL
+    slow = replace(model.axes["x"].hardware, velocity=1e-6)
+    crawls = model.with_axis("x", replace(model.axes["x"], hardware=slow))
+    plans, why = next_experiments({"x": made.diagnosis_of()}, crawls)
+    assert plans == {}
+    assert why["x"].startswith("axis x can run none of the experiments; check its limits and ")
+    assert "longest_plateau 0.25 s, dwell 0.162 s: axis x hardly moves" in why["x"]
+
+
 def test_of_two_explanations_it_is_said_why_the_machine_can_run_none() -> None:
     model = made.MODEL
     still = replace(model.axes["x"].hardware, travel=None)

@@ -70,6 +70,18 @@ def test_a_change_of_five_floors_is_told_within_five_seconds_and_no_other(log) -
     assert alarm.after > 2.0 * alarm.before
 
 
+@pytest.mark.parametrize(("gap", "tells"), [(0.0, "...xxxxxx"), (0.5, "...xx...x")])
+def test_a_window_tells_of_an_axis_what_three_seconds_before_it_prepare(log, gap, tells) -> None:
+    """Of one that does not follow on the last, as of the first."""
+    watcher, told = Watcher(MODEL), ""
+    for i in range(9):
+        start = i + gap * (i >= 5)
+        window = watcher.take(start, log.part(1000 * i, 1000 * (i + 1)))
+        assert (window.end, len(window.log), window.alarms) == (start + 1.0, 1000, ())
+        told += "".join(axis.axis for axis in window.axes) or "."
+    assert told == tells
+
+
 @pytest.mark.parametrize(("floors", "unlike"), [(0.0, False), (30.0, True)])
 def test_a_machine_that_was_never_as_its_model_is_told(log, floors, unlike) -> None:
     """No change tells of it."""

@@ -14,6 +14,7 @@ from cli_runs import refusal, twin
 from identify.project import history
 from identify.project.entries import AnswerEntry, ExportEntry, ModelEntry, Project
 from identify.project.folder import Folder
+from twin.logs import AxisLog, Log, write_log
 
 T = np.arange(4000) / 1000.0
 NAMES = ("run1.csv", "run $(touch made); 2.csv", "run3.csv")
@@ -139,6 +140,37 @@ def test_what_is_lacking_is_said_in_one_line(tmp_path):
         assert done.returncode == 2
         assert said in done.stderr, words
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_logs_are_taken_given_roles_left_and_taken_back(tmp_path):
+    for name in ("a b.mcap", "b.mcap", "c.mcap"):
+        position, force = np.random.default_rng(len(name)).standard_normal((2, 1000))
+        axis = AxisLog({"position": position, "force": force})
+        write_log(Log(1000.0, {"x": axis}), tmp_path / name)
+    told = {}
+    for words in (
+        ["project", "init"], ["project", "take", "a b.mcap", "b.mcap", "--to", "test"],
+        ["project", "role", "a b.mcap", "--to", "training"], ["project", "leave", "b.mcap"],
+        ["undo"], ["project", "take", "c.mcap"],
+    ):  # fmt: skip
+        done = twin(*words, "--json", folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        told = json.loads(done.stdout)
+    roles = {r["file"]: r["role"] for r in told["recordings"]}
+    assert roles == {"a b.mcap": "training", "c.mcap": "selection", "b.mcap": "test"}
+    assert told["history"] == [
+        "twin project init", "twin project take 'a b.mcap' b.mcap --to test",
+        "twin project role 'a b.mcap' --to training", "twin project leave b.mcap", "twin undo",
+        "twin project take c.mcap",
+    ]  # fmt: skip
+    for words, said in (
+        (["role", "b.mcap", "--to", "tests"], "--to tests: give training, selection or test"),
+        (["take", "b.mcap", "--to", "none"], "--to none: give training, selection or test"),
+        (["role", "d.mcap", "--to", "test"], "d.mcap: "),
+        (["leave", "d.mcap", "b.mcap"], "b.mcap, d.mcap: not all are recordings of this project"),
+        (["take", "d.mcap"], "d.mcap"),
+    ):
+        assert refusal("project", *words, folder=tmp_path).startswith(f"twin: {said}")
 
 
 def exported(name: str):
