@@ -139,6 +139,12 @@ def fails():
     raise KeyError("damaged\n  table")
 
 
+def talks(value):
+    os.write(1, b"loading\n")
+    os.write(2, b"a warning\n")
+    return value
+
+
 def not_sent():
     return lambda: None
 
@@ -159,6 +165,11 @@ def test_isolated_work_gives_its_answer_its_refusal_or_none():
     assert isolated(hungry, 10**6, seconds=20.0, memory=10**8) == 10**6
     with pytest.raises(InputError, match="takes more memory"):
         isolated(hungry, 3 * 10**8, seconds=20.0, memory=10**8)
+
+
+def test_what_isolated_work_prints_is_nobodys_concern(capfd):
+    assert isolated(talks, 3, seconds=20.0) == 3
+    assert capfd.readouterr() == ("", "")
 
 
 def test_an_error_in_isolated_work_is_told_and_an_exit_as_an_exit():

@@ -139,6 +139,33 @@ def test_emps_as_diagnosed_simulates_the_pulses_better_than_published(shared_dat
     assert "x" not in found.model.intervals
 
 
+RUBBING = (("viscous_friction", {"c": 20.0}),)
+
+
+@pytest.fixture(scope="module")
+def sprung(slide) -> Log:
+    """Of a mass on a spring of 300 N/m, which the models below lack."""
+    springy = [Fitted.at_start(CATALOGUE[n], v) for n, v in RUBBING + (("spring", {"k1": 300.0}),)]
+    machine = slide.with_axis("x", replace(slide.axes["x"], effects=tuple(springy)))
+    motion = OpenLoopSine("x", 2.0, amplitude=6.0, period=0.7)
+    return simulate(machine, motion, seed=3, simulator=ReducedSimulator)
+
+
+@pytest.mark.parametrize("off", [1.0, 0.2])
+def test_where_much_is_left_the_least_error_is_found_from_wherever(slide, sprung, off) -> None:
+    effects = tuple(Fitted.at_start(CATALOGUE[name], values) for name, values in RUBBING)
+    axis = replace(slide.axes["x"], effects=effects)
+    where, logs = free_parameters(axis), prepared(slide.with_axis("x", axis), sprung)
+    begun = write(axis, where, off * read(axis, where))
+    found = fit_simulated_motion(begun, logs)
+    assert found.outcome is Outcome.CONVERGED
+    assert len(found.errors_of_starts) == 4
+    assert found.error < min(found.errors_of_starts)
+    assert found.error == pytest.approx(0.014993, rel=1e-4)  # m
+    assert found.axis.mass == pytest.approx(1.745, rel=1e-3)  # what a spring leaves of it
+    assert found.error < 0.5 * found.error_begun == 0.5 * simulated_error(begun, logs)
+
+
 OPEN = np.full(2, -np.inf), np.full(2, np.inf)
 
 
