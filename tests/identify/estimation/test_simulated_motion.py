@@ -145,7 +145,8 @@ RUBBING = (("viscous_friction", {"c": 20.0}),)
 @pytest.fixture(scope="module")
 def sprung(slide) -> Log:
     """Of a mass on a spring of 300 N/m, which the models below lack."""
-    springy = [Fitted.at_start(CATALOGUE[n], v) for n, v in RUBBING + (("spring", {"k1": 300.0}),)]
+    laws = (*RUBBING, ("spring", {"k1": 300.0}))
+    springy = [Fitted.at_start(CATALOGUE[name], values) for name, values in laws]
     machine = slide.with_axis("x", replace(slide.axes["x"], effects=tuple(springy)))
     motion = OpenLoopSine("x", 2.0, amplitude=6.0, period=0.7)
     return simulate(machine, motion, seed=3, simulator=ReducedSimulator)
