@@ -139,6 +139,21 @@ def level(samples: int, droop: float = 0.0) -> Log:
     return drive(change=change)
 
 
+def constant(noise: float, size: float):
+    """A force of one value, with noise, beside a part of what a sine may make of it unsaid."""
+    n = noise * axis_of(drive()).smoother.held_noise(1.0)
+    most = np.sqrt(2.0 * (min(3.0 * n, 0.01 * abs(size)) ** 2 - n**2))
+
+    def make(part: float) -> Log:
+        def change(columns: dict[str, Array]) -> None:
+            wave = part * most * np.sin(3.0 * T[:4000])
+            columns["force"][:] = size + noise * WHITE[:4000] + wave
+
+        return drive(change=change)
+
+    return make
+
+
 def off_below(floor: float) -> Log:
     def change(columns: dict[str, Array]) -> None:
         columns["force"][:] = np.maximum(columns["force"], 0.0) + floor
@@ -210,6 +225,9 @@ CASES = {
     "backwards": Case(back_for(-1.0), [0.03], 0.015, Fault.WEAK_EXCITATION,
                       "the axis moves only backwards (", 98.5),
     "slow": Case(slow, [1.6], 0.8, Fault.WEAK_EXCITATION, "the mass cannot be identified"),
+    **{f"{size:g} N with noise of {noise:g} N": Case(
+        constant(noise, size), [1.06], 0.94, Fault.WEAK_EXCITATION, "force is ", size)
+       for noise, size in ((1e-3, 5.0), (0.05, 2.0), (0.05, -2.0))},
     "one speed": Case(spread, [0.06], 0.04, Fault.WEAK_EXCITATION,
                       "there is one speed only, 0.2 m/s, "),
     "too short": Case(lambda s: drive(seconds=s), [0.5, 0.501], 0.499, Fault.TOO_SHORT,
