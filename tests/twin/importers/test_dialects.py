@@ -117,6 +117,31 @@ def test_a_torn_file_is_one_line_or_read_as_far_as_it_is_proved(tmp_path, name):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("count", [100, 103])
+def test_lines_within_labelled_values_that_are_none_are_named_up_to_a_hundred(tmp_path, count):
+    path = written(tmp_path, "labelled")
+    lines = path.read_text().splitlines()
+    for k in range(count):
+        lines[20 + 2 * k] = "overrun"
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError) as refused:
+        import_log(path, mapping(tmp_path, map_of("labelled")))
+    said = str(refused.value)
+    assert f"{path}: line 21, line 23, line 25" in said
+    more = " and 3 more" if count > 100 else ""
+    assert f"line 219{more}: without a number behind each of t, pos, u; complete or cut" in said
+
+
+def test_an_attribute_of_hdf5_that_is_one_number_tells_the_rate(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = written(tmp_path, "hdf5")
+    with h5py.File(path, "a") as file:
+        file.attrs["sample_rate"] = 250.0
+        file.attrs["rate"] = np.array([125.0, 500.0])
+    log = import_log(path, mapping(tmp_path, map_of("hdf5", "")))
+    assert log.sample_rate == 250.0
+
+
 def test_a_pointer_of_git_lfs_is_called_one(tmp_path):
     for name in ("csv", "mcap", "mat"):
         path = tmp_path / SAMPLES[name].file

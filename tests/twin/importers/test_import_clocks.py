@@ -221,6 +221,7 @@ def test_files_of_one_rate_need_no_clock(tmp_path):
         (("file = 2", "file = 3"), r"file = 3: the map has 2 \[\[files\]\]"),
         (("sample_rate = 2000.0", ""), "files 2: give either time or sample_rate"),
         (("resample = 1000.0", "resample = 1000.0\nsample_rate = 5.0"), "give them under"),
+        (("[[files]]\nsample_rate = 2000.0\noffset = 1.5", ""), r"files = .*: give tables "),
     ],
 )
 def test_what_is_wrong_with_several_files_is_said(tmp_path, change, message):

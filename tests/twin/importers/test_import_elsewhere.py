@@ -75,6 +75,13 @@ def test_twincat_scope(tmp_path, shared, decimal, end):
     assert_signals(imported(tmp_path, "a.csv", timed))
 
 
+def test_the_times_of_each_channel_of_a_scope_are_numbered(tmp_path):
+    (tmp_path / "a.csv").write_text(scope(shared=False))
+    columns = table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
+    assert list(columns) == ["time", "MAIN.fPos", "time[2]", "MAIN.fForce"]
+    np.testing.assert_array_equal(columns["time[2]"], np.arange(COUNT))
+
+
 def test_two_scopes_begin_when_each_says_that_it_did(tmp_path):
     for name, ticks in (("a", FILETIME), ("b", FILETIME + 5 * 10**4)):  # of 100 ns: 5 ms later
         (tmp_path / f"{name}.csv").write_text(scope(shared=True).replace(str(FILETIME), str(ticks)))

@@ -370,3 +370,44 @@ def test_of_a_recording_with_a_gap_that_begins_again_the_longest_part_is_taken(t
     (tmp_path / "a.csv").write_text("\n".join(["time [s],q,f", *lines]))
     told = "rows = [251, 450] # the longest of 3 parts; the others: [1, 100] and [101, 250]"
     assert told in proposed(tmp_path)
+
+
+def moved(row: int, seconds: float) -> np.ndarray:
+    """From a row on later than the even times."""
+    return T + seconds * (np.arange(COUNT) >= row)
+
+
+USUAL = "usual are 0.004 s a sample; give resample = 250 (Hz) in the map, or sample_rate in place "
+APART = "import each part as a log of its own, with rows = [1, 150] or rows = [151, "
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (T[::-1], "the time runs backwards, from 2.396 s in the first row to 0 s in the last"),
+        (np.delete(T, 100),
+         f"the time has a gap: 0.396 s is followed by 0.404 s in row 101, {USUAL}"),
+        (np.where(np.arange(COUNT) == 200, T[199], T),
+         f"the time does not increase: 0.796 s is followed by 0.796 s in row 201, {USUAL}"),
+        (0.02 * (np.arange(COUNT) // 5), "the time is the same in several rows each, 0 s in row 2 "
+         "and before; give sample_rate = 250 (Hz) in place of time"),
+        (T + 1e-3 * (np.arange(COUNT) == 300), "the time is off the even grid by up to 25 % of a "
+         f"sample: 1.196 s is followed by 1.201 s in row 301, {USUAL}"),
+        (moved(150, 0.0744), "the time has a gap: 0.596 s is followed by 0.6744 s in row 151, "),
+        (moved(150, 0.078), f"there is nothing between 0.596 s and 0.678 s; {APART}600] in "),
+        (moved(150, 1.0) + (np.arange(COUNT) >= 400), "there is nothing between 0.596 s and 1.6 s, "
+         f"and once more; {APART}400] or rows = [401, 600] in the map"),
+        (np.tile(T[:30], 104), "the time falls back in row 31 (0.116 s is followed by 0 s), row 6"),
+        (np.where(np.arange(COUNT) == 2, np.nan, T), "the time in row 3 is nan; give every row a "),
+    ],
+)  # fmt: skip
+def test_times_that_are_none_are_refused_with_the_first_row_and_what_to_do(tmp_path, times, said):
+    n = len(times)
+    write_csv(tmp_path / "a.csv", {"t": times, "q": np.resize(Q, n), "f": np.resize(F, n)})
+    known = mapping(tmp_path, map_of("q", "f", clock="t in s"))
+    with pytest.raises(InputError) as refused:
+        import_log(tmp_path / "a.csv", known)
+    assert str(refused.value).startswith(f"{tmp_path / 'a.csv'}: column 't': {said}")
+    if n > COUNT:  # of 103 places a hundred are told
+        assert str(refused.value).count("is followed by") == 100
+        assert "0 s) and 3 more: the clock was put back" in str(refused.value)
