@@ -65,7 +65,7 @@ MOVES_A_MASS = 20.0 * np.gradient(SPEED, T) + 2.0 * np.sign(SPEED)
         ({"one": T, "two": NOISE, "three": V, "four": Q, "five": F},
          {"x": {"position": "four", "velocity": "three", "force": "five"}}, ""),
         ({"one": T, "two": F, "three": NOISE, "four": Q},
-         {"x": {"position": "four", "force": "two"}}, ""),
+         {"x": {"position": "four", "force": "two"}}, "likely: the motion explains 100 % of it"),
         # what follows the position is its setpoint and no force
         ({"a": T, "b": REACHED, "c": SPEED, "d": GOAL, "e": PUSH},
          {"x": {"position": "b", "velocity": "c", "setpoint_position": "d", "force": "e"}},

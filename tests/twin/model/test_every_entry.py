@@ -129,6 +129,9 @@ def value_at(document: Any, path: tuple[Any, ...]) -> Any:
         (("axes", "a b"), {"mass": 1.0}, "give a table for each of 1 to 64 axes"),
         (("mujoco",), "../other.xml", "without folders"),
         (("name",), "x\n\x00", "give a text of up to 200 characters on one line"),
+        (("intervals",), {"x": {"above_floor": -0.1}}, "intervals.x.above_floor = -0.1: give "),
+        (("intervals",), {"x": {"mass": [2.0, 1.0]}}, r"mass = \[2.0, 1.0\]: give two numbers, "),
+        (("intervals",), {"q": {}}, "intervals: the model has no axis 'q'; it has x, y"),
         (("history", 0, "notes"), "why", r"history.0: notes = 'why': give a list of texts"),
     ],
 )  # fmt: skip

@@ -22,6 +22,7 @@ from twin.model.file import (
 )
 from twin.model.machine import AxisModel, Fitted, Hardware, HistoryStep, MachineModel
 from twin.model.parameters import free_parameters, read, write
+from twin.model.units import Scale, has_size
 
 
 def law(p, s, io):  # never run here
@@ -262,6 +263,22 @@ def test_every_value_stands_under_its_own_name_with_its_unit():
     assert "fixed" not in document["axes"]["y"]
     assert "travel" not in document["axes"]["y"]
     assert document["sample_rate"] == 3210.5
+
+
+SIZES = {"N": 20.0, "m": 0.5, "m/s": 0.25, "N/m": 40.0, "N s/m": 80.0, "kg": 160.0, "J": 10.0,
+         "kg m^2": 40.0, "N m": 10.0, "1/m": 2.0, "m/s^2": 0.125, "N s^2/m^2": 320.0,
+         "s": 2.0, "Hz": 0.5, "1": 1.0}  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", SIZES)
+def test_the_size_of_a_quantity_is_that_of_the_force_the_travel_and_the_time(unit):
+    """20 N, 0.5 m and 2 s; what has neither force nor length is as large on any machine."""
+    assert Scale(20.0, 0.5, 2.0).size(unit) == pytest.approx(SIZES[unit], rel=1e-12)
+    assert has_size(unit) is (unit not in ("s", "Hz", "1"))
+
+
+def test_a_model_of_python_has_the_rate_of_one_of_a_file():
+    assert MachineModel("m", {"x": AxisModel(1.0)}).sample_rate == 10_000.0
 
 
 def test_an_mjcf_that_is_there_already_is_left_as_it_is(tmp_path):
