@@ -135,6 +135,19 @@ def test_the_numbers_of_an_alarm_are_means_of_its_nights_in_its_unit(share: floa
     assert alarm.half_width == pytest.approx(width(before, after), rel=1e-3)
 
 
+def test_changes_one_behind_the_other_are_one_alarm_since_the_first_and_turns_are_two() -> None:
+    """Dates are of the first change; the sizes are those before it and after the last."""
+    values = FC * (stepped(count=120) + 0.3 * (np.arange(120) >= 75))
+    (alarm,) = alarms_of([panel(values[None])])
+    assert (alarm.changed - date(2026, 1, 1)).days == 40
+    assert alarm.night < date(2026, 1, 1) + timedelta(days=50)
+    assert alarm.before == pytest.approx(values[:40].mean())
+    assert alarm.after == pytest.approx(values[-5:].mean())
+    back = FC * (stepped(count=120) - 0.2 * (np.arange(120) >= 75))
+    days = [(a.changed - date(2026, 1, 1)).days for a in alarms_of([panel(back[None])])]
+    assert sorted(days) == [40, 75]
+
+
 def test_of_a_force_error_they_are_ratios() -> None:
     values = 0.003 * np.exp(4.0 * stepped())
     (alarm,) = alarms_of([panel(values[None], "force_error")])

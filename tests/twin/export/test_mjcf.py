@@ -94,6 +94,16 @@ def test_a_dc_motor_holds_lugre_friction_as_it_is(speed, driven):
     assert [r.part for r in nearly.approximated] == ["lugre"]
 
 
+def test_a_joint_whose_motor_holds_the_friction_has_none_of_its_own():
+    driven = DRIVEN.replace('type="slide"', 'type="slide" frictionloss="3" damping="0.5"')
+    axis = AxisModel(1.0, effects=(fitted("lugre", **BRISTLES),), mass_fixed=True)
+    made = export(MachineModel("slide", {"x": axis}, 1000.0, driven, "slide.xml"), {})
+    built = mujoco.MjModel.from_xml_string(made.files["slide.xml"])
+    assert built.dof_frictionloss.tolist() == [0.0]
+    said = {r.part: r.text for r in made.written}
+    assert said["frictionloss"] == "3 N becomes 0 N"
+
+
 def test_a_joint_may_have_the_name_of_an_attribute():
     named = ARM.replace('"elbow"', '"joint1"')
     whole = model(named)

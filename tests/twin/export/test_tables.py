@@ -17,7 +17,15 @@ from identify.testing import assert_exported
 from twin.errors import InputError
 from twin.export import Held, find_exporter
 from twin.export.formats import csv
-from twin.export.tables import AxisTables, TableFormat, fewest_points, motions, tables
+from twin.export.tables import (
+    ENTRIES,
+    AxisTables,
+    Periodic,
+    TableFormat,
+    fewest_points,
+    motions,
+    tables,
+)
 from twin.feedforward import feedforward
 from twin.logs import AxisLog, Log, write_log
 from twin.model.file import save_model
@@ -43,6 +51,18 @@ UNEVEN = (
 
 def slide(*effects: Fitted) -> MachineModel:
     return MachineModel("slide", {"x": AxisModel(3.0, HARDWARE, effects)}, 1000.0)
+
+
+@pytest.mark.parametrize("size", [0.02, 30.0])
+def test_harmonics_are_those_of_a_hundredth_of_the_largest(size: float) -> None:
+    """A mean, and cosine less i sine of each; the least two are just above it and just below."""
+    turn = 2.0 * np.pi * np.arange(ENTRIES) / ENTRIES
+    force = 0.5 + np.sin(turn) - 0.3 * np.cos(3.0 * turn)
+    force += 0.0103 * np.sin(7.0 * turn) + 0.0097 * np.cos(9.0 * turn)
+    found = Periodic("cogging", 0.024, size * force).harmonics()
+    assert list(found) == [0, 1, 3, 7]
+    wanted = size * np.array([0.5, -1j, -0.3, -0.0103j])
+    np.testing.assert_allclose(list(found.values()), wanted, atol=1e-12 * size)
 
 
 def test_the_sum_of_the_tables_is_the_force_of_the_model() -> None:
