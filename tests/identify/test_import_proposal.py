@@ -45,6 +45,23 @@ def test_without_a_terminal_it_shows_what_it_proposes_and_writes_nothing(recordi
     assert [p.name for p in recording.parent.iterdir()] == [recording.name]
 
 
+@pytest.mark.parametrize("out", [None, "b.mcap"])
+def test_entries_that_are_set_are_in_the_log_which_has_the_recordings_name_or_its_own(
+    recording, out
+):
+    given = ("--set", "axes.x.position.sign=-1", "axes.x.force.offset=2.5")
+    chosen = () if out is None else ("-o", out)
+    done = twin("import", recording.name, *given, *chosen, folder=recording.parent)
+    assert done.returncode == 0, done.stderr
+    made = recording.parent / (out or "run 1.mcap")
+    assert sorted(p.name for p in recording.parent.iterdir()) == sorted(
+        [recording.name, made.name, f"{made.stem}.map.toml"]
+    )
+    axis = read_log(made).axes["x"]
+    assert axis.position == pytest.approx(-X, abs=1e-9)
+    assert axis.force == pytest.approx(F + 2.5, abs=1e-6)
+
+
 def test_yes_writes_log_and_map_and_says_what_they_prove(recording):
     folder = recording.parent
     done = twin("import", recording.name, "--yes", "-o", "run.mcap", folder=folder)

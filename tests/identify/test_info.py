@@ -127,6 +127,8 @@ EVERY = COMMANDS | {
 
 def test_a_whole_installation_is_one_line_each(tmp_path) -> None:
     said = cli_runs.twin("doctor", folder=tmp_path)
+    assert "compiled functions" in said.stdout
+    assert "cannot be written" not in said.stdout
     assert said.returncode == 0
     lines = said.stdout.splitlines()
     topics = ["twin", "Python", "packages", "importers", "fleet", "live", "cache"]

@@ -199,6 +199,16 @@ def test_of_two_writers_neither_overwrites_the_other(tmp_path):
     assert sorted(found) == ["a"] * 8 + ["b"] * 8
 
 
+def test_a_free_name_has_the_number_behind_the_last_of_its_kind(tmp_path):
+    """Whatever its zeros and its ending: what is beside an answer has its number too."""
+    folder = Folder(tmp_path)
+    assert folder.free_name("answers", "{}-fit.json") == Path("answers/1-fit.json")
+    for name in ("2-fit.json", "007-fit.json", "11-check.json", "a12-fit.json", "9-fit.json.new"):
+        (tmp_path / "answers" / name).touch()
+    assert folder.free_name("answers", "{}-fit.json") == Path("answers/10-fit.json")
+    assert folder.free_name("answers", "{}-check.json") == Path("answers/12-check.json")
+
+
 def test_an_edit_by_hand_is_one_step_back(tmp_path):
     folder = Folder(tmp_path)
     folder.begin()
