@@ -217,5 +217,18 @@ def test_a_page_is_as_it_was_read(name: str) -> None:
     assert PAGES[name]().splitlines() == kept()[name].splitlines()
 
 
+@pytest.mark.parametrize("lacks", [True, False])
+def test_a_page_is_titled_by_the_machine_and_what_was_asked(lacks: bool) -> None:
+    """With what its model's history tells, of the fit that was diagnosed or of the model given."""
+    result = made.diagnosed() if lacks else made.compared()
+    model = result.fitted if lacks else result.model
+    subject = Subject.of(result, findings=("one",))
+    asked = "what the model lacks" if lacks else "model against measurement"
+    assert subject.title == f"{model.name}: {asked}"
+    assert (subject.result, subject.history, subject.findings) == (result, model.history, ("one",))
+    assert subject.diagnosis is (result if lacks else None)
+    assert subject.comparison is (result.comparison if lacks else result)
+
+
 if __name__ == "__main__":
     FILE.write_text("".join(f"== {n}\n{p()}\n" for n, p in PAGES.items()), encoding="utf-8")
