@@ -133,6 +133,11 @@ def propose(path: Path) -> Proposal:
         columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
+        if len(columns) > _MOST:
+            raise InputError(
+                f"has {len(columns)} columns, at most {_MOST} are looked at; is it written "
+                "sideways, a signal a row? turn it, or give a map that names the columns"
+            )
     stated = find_time_base(table, columns)
     moving = {n: c for n, c in columns.items() if n not in stated.used and np.ptp(c) > 0.0}
     known = not stated.missing
@@ -160,6 +165,7 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
     return with_channels(file, moved)
 
 
+_MOST = 400  # columns; of a robot of thirty joints ten each are some more than any has
 _NO_MOTION = "without a position no column is known to be the force that moves it"
 
 

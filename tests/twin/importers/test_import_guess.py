@@ -408,3 +408,22 @@ def test_which_of_two_is_measured_is_assumed_where_the_numbers_deny_the_names(tm
     text = guess_map(tmp_path / "a.csv").text
     assert "which of both is measured ASSUMED" in text
     assert "which of both is asked for ASSUMED" in text
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_command_in_newtons_beside_a_current_is_the_force_that_it_makes(tmp_path, sign) -> None:
+    """Else a force constant is asked for, of which the two columns together tell all."""
+    asked = F + 0.01 * NOISE
+    columns = {"t": T, "pos [mm]": 1e3 * Q, "Force cmd [N]": asked, "Iq [A]": sign * F / 15.0}
+    write_csv(tmp_path / "a.csv", columns)
+    found = guess_map(tmp_path / "a.csv")
+    assert columns_of(found.text)["x"]["force"] == "Force cmd [N]"
+    assert columns_of(found.text)["x"]["current"] == "Iq [A]"
+    assert not found.missing
+
+
+def test_a_file_that_is_written_sideways_is_refused_at_once(tmp_path: Path) -> None:
+    rows = [",".join(f"{v:.6g}" for v in column[:500]) for column in (T, Q, F)]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    with pytest.raises(InputError, match="at most 400 are looked at; is it written sideways"):
+        guess_map(tmp_path / "a.csv")

@@ -66,6 +66,7 @@ pm .   .       S-0-0051
 fm .   0       r80[0]
 d  .   0       pid.0.output
 ?  .   .       Í
+d  %   x       TCMD(X)[%]
 f  lb-in .     Torque [lb-in]
 f  kgf·cm .    Torque (kgf·cm)
 p  arcsec .    Angle [arcsec]

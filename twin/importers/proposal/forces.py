@@ -12,7 +12,9 @@ from twin.importers.proposal.motion import Explained
 from twin.importers.proposal.names import Name
 from twin.importers.proposal.positions import TOLD
 from twin.importers.proposal.signals import Certainty, File, ProposedAxis, Signal
+from twin.importers.units import is_unit
 
+SI = ("N", "N m")
 CLOSE = 0.1  # of a force, by which the motion may explain one better, and the other be the drive's
 
 
@@ -83,7 +85,8 @@ def _of_those_called(file: File, axis: ProposedAxis, names: Sequence[Name]) -> P
     currents = [c for c in viable if c.name.quantity is Quantity.CURRENT]
     first = max(viable, key=lambda c: c.rank)
     if first.name.quantity is Quantity.CURRENT:
-        forces = []  # commands beside a measured current
+        # Commands beside a measured current say what that makes where they go with it.
+        forces = [c for c in forces if _driven(file, c, candidates) and is_unit(c.name.unit, *SI)]
     for field, some in (("force", forces), ("current", currents)):
         best = [c for c in some if c.rank == max(o.rank for o in some)]
         best = [c for c in best if _driven(file, c, candidates)] or best

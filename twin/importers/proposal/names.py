@@ -336,6 +336,8 @@ def _with_unit(
     if not may:
         return quantity, None, True
     of, unit = may[0]
+    if unit == "%" and not sure and quantity in (Quantity.POSITION, Quantity.VELOCITY):
+        return of, unit, True  # no place is a part of another
     if of is Quantity.CURRENT and "d" in words_of(column):
         return Quantity.OTHER, None, True  # of the d axis: that makes no force
     if unit in RAW and quantity in (
