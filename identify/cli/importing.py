@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -159,7 +161,7 @@ def _by_proposal(sources: Sequence[Path], out: Path | None, yes: bool) -> Reply:
     asks = sys.stdin.isatty() and sys.stderr.isatty() and "--json" not in sys.argv and not yes
     if asks:
         print(f"{shown}\n", file=sys.stderr)
-        answers = _answers(found.needs)
+        answers = _answers(found)
         yes = _is_yes(input_of("take this map? [Y/n] "))
         shown = ""
     if not yes:
@@ -209,18 +211,30 @@ def _written(sources: Sequence[Path], text: str, out: Path, shown: str = "") -> 
     return replace(done, text=told, warnings=[*kept, *done.warnings])
 
 
-def _answers(needs: Sequence[Need]) -> Answers:
+def _answers(found: Proposal) -> Answers:
     """What the user says to what is not known; what is left open stays as it is."""
-    out = {}
-    for need in needs:
-        open_ = f"[{need.assumed}]" if need.assumed else "[not known]"
-        while said := input_of(f"{need.axis}: {need.what} {open_} "):
-            if wrong := _refused(need, said):
-                print(wrong, file=sys.stderr)
-                continue
-            out[need.key] = said
-            break
+    from twin.importers.guess import RATE
+
+    out: dict[tuple[str, str, str], str] = {}
+    if found.asks_rate and (rate := _asked("the sample rate in Hz [not known] ", _no_number)):
+        out[RATE] = rate
+    for need in found.needs:
+        open_ = f"[{need.assumed or 'not known'}]"
+        hint = ", as in 1e6 per metre" if need.other else ""
+        said = _asked(f"{need.axis}: {need.what}{hint} {open_} ", partial(_refused, need))
+        number, *per = said.split(" per ")
+        if said:
+            out[need.axis, need.field, need.other if per and need.other else need.entry] = number
     return out
+
+
+def _asked(question: str, refused: Callable[[str], str]) -> str:
+    """What is typed behind a question, once it is an answer; nothing where nothing is typed."""
+    while said := input_of(question):
+        if not (wrong := refused(said)):
+            break
+        print(wrong, file=sys.stderr)
+    return said
 
 
 def _refused(need: Need, said: str) -> str:
@@ -229,13 +243,20 @@ def _refused(need: Need, said: str) -> str:
     from twin.importers.units import find_unit
     from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
-    try:
-        if need.entry == UNIT:
+    if need.entry == UNIT:
+        try:
             find_unit(said, LINEAR_UNITS[need.field], ROTARY_UNITS[need.field])
-            return ""
+        except InputError as error:
+            return str(error)
+        return ""
+    is_other = need.other is not None and re.search(r" per m(etre|eter)?$", said)
+    return _no_number(said.split(" per ")[0] if is_other else said)
+
+
+def _no_number(said: str) -> str:
+    """Why something is no number other than 0; empty where it is one."""
+    try:
         value = float(said)
-    except InputError as error:
-        return str(error)
     except ValueError:
         return f"'{said}' is not a number; give one such as 0.0015, or nothing"
     return "" if math.isfinite(value) and value != 0.0 else "give a finite number other than 0"

@@ -144,6 +144,26 @@ def test_on_a_terminal_it_asks_for_what_is_not_known(tmp_path):
     assert (axis.position.unit, axis.force.scale) == ("mm", 0.5)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no terminal to be had there")
+def test_on_a_terminal_the_rate_is_asked_for_and_counts_of_an_axis_that_travels(tmp_path):
+    """Counts a turn made it a rotary axis, whatever was answered."""
+    columns = np.column_stack([np.round(1e6 * X), F / 20.0])
+    head = "encoder (counts),current (A)"
+    np.savetxt(tmp_path / "a.csv", columns, "%.9g", ",", header=head, comments="")
+    answers = ["often", "1000", "1e6 per turn", "1e6 per metre", "20", "y"]
+    said, code = typed(tmp_path, ["import", "a.csv", "-o", "a.mcap"], answers)
+    assert code == 0, said
+    assert "'often' is not a number" in said
+    assert "'1e6 per turn' is not a number" in said
+    assert "moved mass 5.0" in said
+    mapping = load_mapping(tmp_path / "a.map.toml")
+    assert mapping.sample_rate == 1000.0
+    position = mapping.axes["x"].position
+    assert position is not None
+    assert (position.counts_per_metre, position.counts_per_turn) == (1e6, None)
+
+
 def test_an_edited_map_or_model_is_kept_when_it_is_written_over(recording):
     folder = recording.parent
     first = ("import", "--guess", recording.name, "-o", "map.toml")

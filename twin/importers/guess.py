@@ -82,9 +82,16 @@ class Proposal:
     def map_text(self, answers: Answers) -> str:
         """The map, with what the user knows."""
         lines = [*self.head]
+        if (rate := answers.get(RATE)) is not None:
+            lines = [f"sample_rate = {rate} # Hz, as given" if _asks_rate(x) else x for x in lines]
         for axis in self.axes:
             lines += lines_of(self.file, axis, answers)
         return "\n".join([*lines, *self.tail]) + "\n"
+
+    @property
+    def asks_rate(self) -> bool:
+        """Whether the file tells no sample rate."""
+        return any(map(_asks_rate, self.head))
 
     @cached_property
     def needs(self) -> list[Need]:
@@ -97,10 +104,11 @@ class Proposal:
         scales = [
             f"axis {n.axis}: the scale of its {n.field} is not known: {n.what}"
             for n in self.needs
-            if n.entry in PER_ONE and n.key not in answers
+            if n.entry in PER_ONE and n.given(answers) is None
         ]
         words = self.words if asked or self.timeless else ()
-        return (*self.timeless, *self.holes.values(), *asked, *scales, *words)
+        timeless = () if RATE in answers else self.timeless
+        return (*timeless, *self.holes.values(), *asked, *scales, *words)
 
     @cached_property
     def rows(self) -> list[ColumnRow]:
@@ -165,8 +173,13 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
     return with_channels(file, moved)
 
 
+RATE = ("", "", "sample_rate")  # the key of an answer
 _MOST = 400  # columns; of a robot of thirty joints ten each are some more than any has
 _NO_MOTION = "without a position no column is known to be the force that moves it"
+
+
+def _asks_rate(line: str) -> bool:
+    return line.startswith("# sample_rate = ?")
 
 
 def _in_words(columns: Mapping[str, np.ndarray]) -> Iterator[str]:

@@ -43,7 +43,7 @@ class Need:
     """What the file does not tell, of an axis' field. entry: in the map, such as scale or unit.
 
     what: the quantity that is asked for. assumed: what is taken if nobody says otherwise, None
-    where nothing can be.
+    where nothing can be. other: an entry that may be given in its place.
     """
 
     axis: str
@@ -51,6 +51,13 @@ class Need:
     entry: str
     what: str
     assumed: str | None = None
+    other: str | None = None
+
+    def given(self, answers: Answers) -> tuple[str, str] | None:
+        """The entry that a user gave, and its value; None where none was."""
+        entries = (e for e in (self.entry, self.other) if e is not None)
+        told = ((e, answers.get((self.axis, self.field, e))) for e in entries)
+        return next(((e, value) for e, value in told if value is not None), None)
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -94,13 +101,12 @@ class MapEntry:
         """The same with what the user knows."""
         entry = self
         for need in self.needs:
-            if (given := answers.get(need.key)) is None:
+            if (size := need.given(answers)) is None:
                 continue
             left = tuple(n for n in entry.needs if n is not need)
-            entry = replace(entry, needs=left, remarks=(f"{need.entry} as given",))
+            entry = replace(entry, needs=left, remarks=(f"{size[0]} as given",))
             states_unit = need.entry == UNIT
-            size = (need.entry, given)
-            entry = replace(entry, unit=given) if states_unit else replace(entry, size=size)
+            entry = replace(entry, unit=size[1]) if states_unit else replace(entry, size=size)
         return entry
 
 
@@ -239,7 +245,9 @@ def _without_scale(
         either = "" if " or " not in si else f", or {METRE} where the axis travels"
         what = f"{entry} of the encoder of {signal.column}{either}"
         remark = f"{entry} NOT KNOWN{either}{hint}"
-    need = Need(axis.name, signal.field, entry, f"{what}{f' ({how})' if how else ''}")
+    what += f" ({how})" if how else ""
+    other = METRE if entry == TURN and " or " in si else None
+    need = Need(axis.name, signal.field, entry, what, other=other)
     return MapEntry(signal, unit, (remark,), (need,))
 
 
