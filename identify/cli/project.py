@@ -91,8 +91,11 @@ def take(
 
     def change(project: Project) -> Project:
         for log in logs:
+            known = next((r for r in project.recordings if r.file == str(log)), None)
+            if known is not None and wanted is None:
+                continue  # it keeps its role
             entry = RecordingEntry(file=str(log), role=wanted or project.next_role())
-            others = [r for r in project.recordings if r.file != entry.file]
+            others = [r for r in project.recordings if r is not known]
             project = project.model_copy(update={"recordings": [*others, entry]})
         return project
 

@@ -151,7 +151,7 @@ def test_logs_are_taken_given_roles_left_and_taken_back(tmp_path):
     for words in (
         ["project", "init"], ["project", "take", "a b.mcap", "b.mcap", "--to", "test"],
         ["project", "role", "a b.mcap", "--to", "training"], ["project", "leave", "b.mcap"],
-        ["undo"], ["project", "take", "c.mcap"],
+        ["undo"], ["project", "take", "c.mcap", "b.mcap"],  # which keeps its role
     ):  # fmt: skip
         done = twin(*words, "--json", folder=tmp_path)
         assert done.returncode == 0, done.stderr
@@ -161,7 +161,7 @@ def test_logs_are_taken_given_roles_left_and_taken_back(tmp_path):
     assert told["history"] == [
         "twin project init", "twin project take 'a b.mcap' b.mcap --to test",
         "twin project role 'a b.mcap' --to training", "twin project leave b.mcap", "twin undo",
-        "twin project take c.mcap",
+        "twin project take c.mcap b.mcap",
     ]  # fmt: skip
     for words, said in (
         (["role", "b.mcap", "--to", "tests"], "--to tests: give training, selection or test"),
