@@ -19,6 +19,7 @@ from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
+from twin.importers.proposal.following import made_positions
 from twin.importers.proposal.forces import exchanged, with_force
 from twin.importers.proposal.names import names_of, unit_of
 from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
@@ -148,10 +149,13 @@ def propose(path: Path) -> Proposal:
             )
     stated = find_time_base(table, columns)
     moving = {n: c for n, c in columns.items() if n not in stated.used and np.ptp(c) > 0.0}
-    known = not stated.missing
-    file = File(names_of([*moving]), columns_of(moving), stated.step if known else None)
+    known, made = not stated.missing, made_positions(moving)
+    moving |= {m.name.column: m.values for m in made}
+    moving = {n: c for n, c in moving.items() if n not in {m.error for m in made}}
+    names = names_of([*moving]) | {m.name.column: m.name for m in made}
+    file = File(names, columns_of(moving), stated.step if known else None)
     axes = tuple(_axis(file, a, names) for a, names in axes_of(file.names, file.columns).items())
-    used = {*stated.used, *(c for axis in axes for c in axis.columns)}
+    used = {*stated.used, *(c for axis in axes for c in axis.columns), *(m.error for m in made)}
     taken = {*stated.used, *(s.column for axis in axes for s in axis.signals.values())}
     left = {n: c for n, c in table.columns.items() if n not in used}
     others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]

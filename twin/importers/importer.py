@@ -237,7 +237,9 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
     table = _table(path, mapping, name)
     facts = {"original_format": name, "original_sha256": digest}
     scalars = {n: _scalar(n, numbers(n, table.columns[n])) for n in mapping.scalars()}
-    columns = {c.name: numbers(c.name, table.columns[c.name]) for c in mapping.columns()}
+    parts = {n: numbers(n, table.columns[n]) for c in mapping.columns() for n in c.parts}
+    _common_length(parts)
+    columns = {c.name: c.raw(parts) for c in mapping.columns()}
     said: list[str] = list(table.said)
     times: Array | None = None
     holes = [hole for n, column in columns.items() if (hole := table.hole(n, column))]

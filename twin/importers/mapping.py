@@ -75,6 +75,10 @@ class TimeMap(_Column):
 class ColumnMap(_Column):
     """The column of a signal: SI value = sign x (scale x raw + offset) x unit."""
 
+    less: str | int | None = None
+    """another column in its unit, which is taken off it: of a set point the following error"""
+    plus: str | int | None = None
+    """another column in its unit, which is added: an error that is position less set point"""
     unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
     scale: float | str = 1.0
     """a finite number other than 0: SI units a raw one; or a scalar of the file"""
@@ -96,6 +100,24 @@ class ColumnMap(_Column):
     file: int = Field(1, ge=1, le=1000)
     """a whole number: which of several files, the first is 1"""
     _si: Unit = PrivateAttr(Unit(1.0, None))
+
+    @property
+    def name(self) -> str:
+        """What it is called: its column, and the one that is added or taken off."""
+        taken = "" if self.less is None else f" less {self.less}"
+        added = "" if self.plus is None else f" plus {self.plus}"
+        return f"{self.column}{taken}{added}"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The columns of its file that it is made of."""
+        return tuple(str(n) for n in (self.column, self.less, self.plus) if n is not None)
+
+    def raw(self, columns: Mapping[str, Array]) -> Array:
+        """Its numbers (n,) of the columns of its file."""
+        made = columns[str(self.column)]
+        made = made if self.less is None else made - columns[str(self.less)]
+        return made if self.plus is None else made + columns[str(self.plus)]
 
     @property
     def key(self) -> str:
@@ -314,7 +336,9 @@ class ImportMap(_File):
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""
         names = [self.time.name] if self.time else []
-        return tuple(dict.fromkeys([*names, *(c.name for c in self.columns()), *self.scalars()]))
+        return tuple(
+            dict.fromkeys([*names, *(n for c in self.columns() for n in c.parts), *self.scalars()])
+        )
 
     def scalars(self) -> tuple[str, ...]:
         """The scalars of a file that scales name."""

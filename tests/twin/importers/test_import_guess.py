@@ -427,3 +427,30 @@ def test_a_file_that_is_written_sideways_is_refused_at_once(tmp_path: Path) -> N
     (tmp_path / "a.csv").write_text("\n".join(rows))
     with pytest.raises(InputError, match="at most 400 are looked at; is it written sideways"):
         guess_map(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(("word", "sign"), [("less", 1.0), ("plus", -1.0)])
+def test_a_set_point_and_its_following_error_make_the_position(tmp_path, word, sign) -> None:
+    """An axis is behind its set point, which tells how the error is counted."""
+    goal = np.r_[Q[25:], np.full(25, Q[-1])]
+    columns = {
+        "t": T,
+        "Lagesollwert [mm]": 1e3 * goal,
+        "Schleppabstand [mm]": sign * 1e3 * (goal - Q),
+    }
+    write_csv(tmp_path / "a.csv", {**columns, "Kraft [N]": F})
+    found = guess_map(tmp_path / "a.csv")
+    assert not found.missing
+    made = f'column = "Lagesollwert [mm]", {word} = "Schleppabstand [mm]", unit = "mm"'
+    assert f"position = {{{made}}}" in found.text
+    assert columns_of(found.text)["x"]["setpoint_position"] == "Lagesollwert [mm]"
+    (tmp_path / "m.toml").write_text(found.text)
+    log = import_log(tmp_path / "a.csv", tmp_path / "m.toml")
+    np.testing.assert_allclose(log.axes["x"].position, Q, atol=1e-9)
+
+
+def test_an_error_beside_a_measured_position_makes_no_other(tmp_path: Path) -> None:
+    columns = {"t": T, "pos [mm]": REACHED, "ref_pos [mm]": GOAL, "pos error [mm]": GOAL - REACHED}
+    write_csv(tmp_path / "a.csv", {**columns, "force [N]": PUSH})
+    found = columns_of(guess_map(tmp_path / "a.csv").text)["x"]
+    assert (found["position"], found["setpoint_position"]) == ("pos [mm]", "ref_pos [mm]")

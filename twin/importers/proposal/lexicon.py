@@ -52,7 +52,7 @@ QUANTITIES: Mapping[Quantity, str] = _by(Quantity, _FILE["quantities"])
 HINTS: Mapping[Quantity, str] = _by(Quantity, _FILE["hints"])
 ROLES: Mapping[SignalRole, str] = _by(SignalRole, _FILE["roles"])
 SMOOTHED, EMPTY, TURNING = _words("smoothed"), _words("empty"), _words("turning")
-COUNTING, RAW = _words("counting"), _words("raw")
+COUNTING, RAW, ERRORS = _words("counting"), _words("raw"), _words("errors")
 RATES: Mapping[str, Mapping[Quantity, Quantity]] = {
     word: {quantity: Quantity[rate.upper()] for quantity, rate in _by(Quantity, rates).items()}
     for word, rates in _FILE["rates"].items()

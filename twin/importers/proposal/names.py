@@ -56,7 +56,8 @@ class Name:
 
     quantity, role: None where it says none. sure: whether a word says the quantity, not only a
     letter, a role or a unit. unit: as the import map knows it. axis: what tells this axis from
-    another. smoothed: whether it was filtered.
+    another. smoothed: whether it was filtered. parts: of a position that two columns make the
+    first, "less" or "plus", and the second.
     """
 
     column: str
@@ -66,6 +67,7 @@ class Name:
     axis: tuple[str, ...]
     sure: bool
     smoothed: bool
+    parts: tuple[str, str, str] | None = None
 
 
 @cache

@@ -80,7 +80,10 @@ class MapEntry:
 
     def line(self, column: TableColumn) -> str:
         """As it stands in the map."""
-        values = {"column": _quoted(self.signal.column), "unit": _quoted(self.unit)}
+        values = {"column": _quoted(self.signal.column)}
+        if (parts := self.signal.name.parts) is not None:
+            values = {"column": _quoted(parts[0]), parts[1]: _quoted(parts[2])}
+        values["unit"] = _quoted(self.unit)
         if self.size is not None:
             entry, value = self.size
             values[entry] = value
