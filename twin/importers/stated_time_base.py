@@ -241,7 +241,8 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
         told += (
             f", where the {own} of its name are {1.0 / (find_unit(own, 's').size * step):.6g} Hz"
         )
-    return unit, told if unit == "s" and own is None else f"unit ASSUMED: {told}"
+    seconds = own is None and _SIZES.get(unit, 1.0) == 1.0
+    return unit, told if seconds else f"unit ASSUMED: {told}"
 
 
 def _usual_step(column: Array) -> float:
