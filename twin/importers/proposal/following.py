@@ -60,7 +60,7 @@ def _has_position(
 def _made(setpoint: Name, error: Name, columns: Mapping[str, Array]) -> MadePosition:
     """An axis is behind its set point: what is positive as that rises is to be taken off."""
     goal, off = columns[setpoint.column], columns[error.column]
-    behind = float(np.dot(np.gradient(goal), off)) > 0.0
+    behind = float(np.dot(np.diff(goal), off[1:])) > 0.0
     word, values = ("less", goal - off) if behind else ("plus", goal + off)
     column = f"{setpoint.column} {word} {error.column}"
     name = Name(

@@ -28,6 +28,7 @@ from twin.importers.units import is_unit
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ω": " omega ", "τ": " tau ", "α": " alpha "})
 _CJK = "\u3040-\u30ff\u3400-\u9fff"
 _TOKENS = re.compile(rf"[{_CJK}]+|[a-z]+|\d+")
+_OF_ANOTHER = frozenset("%")  # parts of another size, which no place is
 _LONE = re.compile(r"(?<![^\W\d_])[À-ÖØ-öø-ÿ](?![^\W\d_])")  # of Russian read as of the West
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 _PATH = re.compile(r"[./:](?=[^./:]*[^\W\d_]{2})")
@@ -338,8 +339,8 @@ def _with_unit(
     if not may:
         return quantity, None, True
     of, unit = may[0]
-    if unit == "%" and not sure and quantity in (Quantity.POSITION, Quantity.VELOCITY):
-        return of, unit, True  # no place is a part of another
+    if unit in _OF_ANOTHER and not sure and quantity in (Quantity.POSITION, Quantity.VELOCITY):
+        return of, unit, True
     if of is Quantity.CURRENT and "d" in words_of(column):
         return Quantity.OTHER, None, True  # of the d axis: that makes no force
     if unit in RAW and quantity in (
