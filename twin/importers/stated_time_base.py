@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,11 +122,32 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
     if found:
-        return _of_times(found, columns, stated, used)
+        base = _of_times(found, columns, stated, used)
+        apart = _own_clocks(found, [*columns])
+        return base if apart is None else replace(base, missing=(*base.missing, apart))
     if stated is not None and stated.rate is not None:
         lines = _of_rate(columns, counters, stated.rate, f"the file states {stated.text!r}")
         return StatedTimeBase(lines, 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
+
+
+def _own_clocks(found: Sequence[_Times], names: Sequence[str]) -> str | None:
+    """That a later column of times, with signals before and behind it, is another clock of these.
+
+    Of messages each has stamps of its own, which may be late.
+    """
+    first, *others = sorted(found, key=lambda one: names.index(one.name))
+    for other in others:
+        place = names.index(other.name)
+        between = place - names.index(first.name) > 1 and place + 1 < len(names)
+        apart = float(np.abs(other.seconds - first.seconds).max())
+        if between and "." not in other.name and apart > 0.5 * first.step:
+            return (
+                f"'{other.name}' is up to {apart:.4g} s from '{first.name}': each is the clock of "
+                "the columns behind it; export them with one, or give the file twice, with a table "
+                "[[files]] and its time for each"
+            )
+    return None
 
 
 def _agreeing(

@@ -411,3 +411,12 @@ def test_times_that_are_none_are_refused_with_the_first_row_and_what_to_do(tmp_p
     if n > COUNT:  # of 103 places a hundred are told
         assert str(refused.value).count("is followed by") == 100
         assert "0 s) and 3 more: the clock was put back" in str(refused.value)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.1])
+def test_two_clocks_in_one_table_are_of_the_columns_behind_them(tmp_path, apart):
+    """That the first was taken for all made 9.8 kg of 12."""
+    rows = [f"{t},{f:.9g},{t + apart},{q:.9g}" for t, f, q in zip(T, F, Q, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["Time F [s],F [N],Time X [s],x [mm]", *rows]))
+    told = guess_map(tmp_path / "a.csv").missing
+    assert any("'Time X [s]' is up to 0.1 s from 'Time F [s]'" in t for t in told) == (apart > 0.0)
