@@ -13,7 +13,7 @@ from twin.effect import ACC, LEAST, MOST, MOVED, OUT, Effect, Kind, Parameter, V
 from twin.knee import Imitated
 from twin.law_parts import COUNTS, at, harmonic_terms, harmonics, of_shortest_pitch
 
-CYCLES = 8  # most over the travel that are tried; what repeats is tried besides
+CYCLES = 8  # most over the travel that are tried; the pitch of a motor is no linkage
 
 
 def law(p, s, io):
@@ -33,9 +33,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "p", "m", 0.1, LEAST, MOST, "travel after which it repeats", period=True,
-            scan=lambda e: (
-                *e.pitches, *(2.0 * e.travel / k for k in range(1, 2 * CYCLES + 1))
-            ),
+            scan=lambda e: tuple(2.0 * e.travel / k for k in range(1, 2 * CYCLES + 1)),
         ),
         *harmonic_terms(3, "1", 0.9),
     ),

@@ -24,7 +24,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 RIVALS = Catalogue(
     CATALOGUE[n]
     for n in (
-        "cogging", "force_constant_ripple", "periodic_disturbance", "quadratic_drag",
+        "cogging", "varying_inertia", "force_constant_ripple", "periodic_disturbance", "quadratic_drag",
         "asymmetric_friction", "actuator_lag", "roller_spikes",
     )
 )  # fmt: skip
