@@ -24,8 +24,8 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 RIVALS = Catalogue(
     CATALOGUE[n]
     for n in (
-        "cogging", "varying_inertia", "force_constant_ripple", "periodic_disturbance", "quadratic_drag",
-        "asymmetric_friction", "actuator_lag", "roller_spikes",
+        "cogging", "varying_inertia", "force_constant_ripple", "periodic_disturbance",
+        "quadratic_drag", "asymmetric_friction", "actuator_lag", "roller_spikes",
     )
 )  # fmt: skip
 A_TURN = (12, 18, 24, 36, 54, 60, 72, 144)
