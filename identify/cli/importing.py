@@ -222,9 +222,9 @@ def _answers(found: Proposal) -> Answers:
         open_ = f"[{need.assumed or 'not known'}]"
         hint = ", as in 1e6 per metre" if need.other else ""
         said = _asked(f"{need.axis}: {need.what}{hint} {open_} ", partial(_refused, need))
-        number, *per = said.split(" per ")
         if said:
-            out[need.axis, need.field, need.other if per and need.other else need.entry] = number
+            entry, value = _entry_of(need, said)
+            out[need.axis, need.field, entry] = value
     return out
 
 
@@ -249,8 +249,15 @@ def _refused(need: Need, said: str) -> str:
         except InputError as error:
             return str(error)
         return ""
-    is_other = need.other is not None and re.search(r" per m(etre|eter)?$", said)
-    return _no_number(said.split(" per ")[0] if is_other else said)
+    return _no_number(_entry_of(need, said)[1])
+
+
+def _entry_of(need: Need, said: str) -> tuple[str, str]:
+    """The entry of the map that an answer is for, and its value: of counts so many per metre."""
+    per = re.search(r" per m(etre|eter)?$", said)
+    if need.other is None or per is None:
+        return need.entry, said
+    return need.other, said[: per.start()]
 
 
 def _no_number(said: str) -> str:

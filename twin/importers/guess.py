@@ -68,7 +68,7 @@ class Proposal:
 
     head: the lines before the axes. tail: those behind them, of columns of no axis. holes: by
     column, where it has no number. timeless: what the file does not tell of its times. words: of
-    columns that hold no numbers.
+    columns that hold no numbers. asking: the line that asks for the sample rate, if any.
     """
 
     name: str
@@ -79,12 +79,14 @@ class Proposal:
     holes: Mapping[str, str]
     timeless: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
+    asking: str = ""
 
     def map_text(self, answers: Answers) -> str:
         """The map, with what the user knows."""
         lines = [*self.head]
         if (rate := answers.get(RATE)) is not None:
-            lines = [f"sample_rate = {rate} # Hz, as given" if _asks_rate(x) else x for x in lines]
+            given = f"sample_rate = {rate} # Hz, as given"
+            lines = [given if line == self.asking else line for line in lines]
         for axis in self.axes:
             lines += lines_of(self.file, axis, answers)
         return "\n".join([*lines, *self.tail]) + "\n"
@@ -92,7 +94,7 @@ class Proposal:
     @property
     def asks_rate(self) -> bool:
         """Whether the file tells no sample rate."""
-        return any(map(_asks_rate, self.head))
+        return bool(self.asking)
 
     @cached_property
     def needs(self) -> list[Need]:
@@ -163,7 +165,9 @@ def propose(path: Path) -> Proposal:
     tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
     missing = {n: hole for n, hole in holes.items() if n in taken}
     lines, words = (head, *stated.lines), tuple(_in_words(table.columns))
-    return Proposal(path.name, file, axes, lines, tail, missing, stated.missing, words)
+    return Proposal(
+        path.name, file, axes, lines, tail, missing, stated.missing, words, stated.asking
+    )
 
 
 def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
@@ -180,10 +184,6 @@ def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
 RATE = ("", "", "sample_rate")  # the key of an answer
 _MOST = 400  # columns; of a robot of thirty joints ten each are some more than any has
 _NO_MOTION = "without a position no column is known to be the force that moves it"
-
-
-def _asks_rate(line: str) -> bool:
-    return line.startswith("# sample_rate = ?")
 
 
 def _in_words(columns: Mapping[str, np.ndarray]) -> Iterator[str]:

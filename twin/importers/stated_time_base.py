@@ -16,7 +16,7 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
-from twin.importers.table import SignalTable, told_apart
+from twin.importers.table import SignalTable, mixed_rows
 from twin.importers.time_base import (
     order_of,
     parts_of,
@@ -44,7 +44,7 @@ _UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": 
                "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
                "s": "s"}  # fmt: skip
 # Between which numbers a column counts a unit of time since a known day, from 1990 to 2060.
-_CLOCKS = (
+_EPOCHS = (
     (3.3e4, 5.9e4, "day", "days of a spreadsheet"),
     (7.26e5, 7.53e5, "day", "days since the year 0"),
     *(
@@ -66,13 +66,15 @@ class StatedTimeBase:
     """The time base of a file.
 
     lines: of a map. step: s a sample, NOMINAL where it is not known. used: the columns that tell
-    times or count, and are no signals. missing: what must be given, a sentence each.
+    times or count, and are no signals. missing: what must be given, a sentence each. asking: the
+    line that asks for the sample rate, empty where none does.
     """
 
     lines: tuple[str, ...]
     step: float
     used: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    asking: str = ""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
     used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
     if found:
         base = _of_times(found, columns, stated, used)
-        apart = _own_clocks(found, [*columns])
+        apart = _disagreeing_times(found, [*columns])
         return base if apart is None else replace(base, missing=(*base.missing, apart))
     if stated is not None and stated.rate is not None:
         lines = _of_rate(columns, counters, stated.rate, f"the file states {stated.text!r}")
@@ -131,7 +133,7 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
     return _asked(columns, counters, stated, used)
 
 
-def _own_clocks(found: Sequence[_Times], names: Sequence[str]) -> str | None:
+def _disagreeing_times(found: Sequence[_Times], names: Sequence[str]) -> str | None:
     """That a later column of times, with signals before and behind it, is another clock of these.
 
     Of messages each has stamps of its own, which may be late.
@@ -188,7 +190,7 @@ def counts(name: str, column: Array) -> bool:
     """Whether a column (n,) counts the samples, with gaps or begun again, and tells no time."""
     if _unit_of(name) is not None or (column != np.rint(column)).any() or len(column) < 3:
         return False
-    if _by_clock(column) is not None:
+    if _since_epoch(column) is not None:
         return False
     steps = np.diff(_continued(column))
     usual = float(np.median(steps))
@@ -253,8 +255,8 @@ def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
     own = _unit_of(name)
     if own is not None and 1.0 / (find_unit(own, "s").size * step) < 5.0 * _FASTEST:
         return own, "its name states the unit"
-    if own is None and (clock := _by_clock(column)) is not None:
-        return clock
+    if own is None and (epoch := _since_epoch(column)) is not None:
+        return epoch
     fits = [u for u, size in _SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
     unit = fits[0] if fits else own or "s"
     told = f"that is {_SIZES.get(unit, 1.0) / step:.6g} Hz"
@@ -280,10 +282,10 @@ def _usual(steps: Array) -> float:
     return float(np.mean(steps[np.abs(steps - middle) <= 0.1 * middle]))
 
 
-def _by_clock(column: Array) -> tuple[str, str] | None:
+def _since_epoch(column: Array) -> tuple[str, str] | None:
     """The unit of times that count since a known day, and why; None where none is as large."""
     first, step = float(column[0]), _usual_step(column)
-    for low, high, unit, since in _CLOCKS:
+    for low, high, unit, since in _EPOCHS:
         rate = 1.0 / (find_unit(unit, "s").size * step)
         if low < first < high and _SLOWEST <= rate <= _FASTEST:
             return unit, f"as many {since}, that is {rate:.6g} Hz"
@@ -343,7 +345,7 @@ def _key(columns: Mapping[str, Array], rows: int) -> str | None:
     for name, column in columns.items():
         once = column[:rows]
         if len({*once.tolist()}) == rows > 1 and (column[rows:] == column[:-rows]).all():
-            return told_apart(name, [f"{value:g}" for value in once])
+            return mixed_rows(name, [f"{value:g}" for value in once])
     return None
 
 
@@ -406,7 +408,8 @@ def _asked(
     else:
         why = "no column rises as times do"
     line = f"# sample_rate = ? # Hz: NOT KNOWN, {why}{unit}"
-    return StatedTimeBase((line,), NOMINAL, used, (f"{why}{unit}; give sample_rate (Hz)",))
+    missing = (f"{why}{unit}; give sample_rate (Hz)",)
+    return StatedTimeBase((line,), NOMINAL, used, missing, asking=line)
 
 
 def _of_rate(

@@ -160,7 +160,7 @@ def numbers(name: str, raw: NDArray) -> Array:
     return array.astype(np.float64)
 
 
-def told_apart(name: str, values: Sequence[str]) -> str:
+def mixed_rows(name: str, values: Sequence[str]) -> str:
     """That rows are of several axes or signals, which a column of that name tells apart."""
     return (
         f"column '{name}' tells of what a row is, {' or '.join(values)}: a row must be one sample "

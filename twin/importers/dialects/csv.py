@@ -19,7 +19,7 @@ from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.proposal.names import units_of
 from twin.importers.stamps import is_date, is_stamp
-from twin.importers.table import SignalTable, parsing, told_apart
+from twin.importers.table import SignalTable, mixed_rows, parsing
 from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
 from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
@@ -188,7 +188,7 @@ def _require_samples(names: Sequence[str], rows: Rows, style: Style) -> None:
         again = count > 1 and len(cells) >= times * count and cells[count:] == cells[:-count]
         words = {c.lower() for c in once if c and not style.is_number(c) and not is_stamp(c)}
         if again and len(words) == count and not words <= _FLAGS:
-            raise InputError(told_apart(name, once))
+            raise InputError(mixed_rows(name, once))
 
 
 def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:

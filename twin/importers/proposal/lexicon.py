@@ -48,7 +48,8 @@ def _words(name: str) -> frozenset[str]:
     return frozenset(_FILE["words"][name].split())
 
 
-QUANTITIES: Mapping[Quantity, str] = _by(Quantity, _FILE["quantities"])
+QUANTITIES: dict[Quantity, str] = _by(Quantity, _FILE["quantities"])
+QUANTITIES[Quantity.OTHER] += f" {_FILE['words']['errors']}"
 HINTS: Mapping[Quantity, str] = _by(Quantity, _FILE["hints"])
 ROLES: Mapping[SignalRole, str] = _by(SignalRole, _FILE["roles"])
 SMOOTHED, EMPTY, TURNING = _words("smoothed"), _words("empty"), _words("turning")
