@@ -225,14 +225,18 @@ class Axis:
         if not beside or abs(beside - found) >= same_lag * abs(found):
             return 0.0
         going, _ = find_lag(self.force, self.regressors, self.going, self.smoother.block)
-        told = self.going.mean() > KEPT_PART
-        lag = going if told and abs(going - found) < PHYSICAL else found
+        lag = going if self._keeps_going and abs(going - found) < PHYSICAL else found
         return lag if self.may_be_late(lag) else 0.0
 
     def may_be_late(self, seconds: float) -> bool:
         """Whether the force may be so many s late: slower motion is not better without it."""
-        told = self.going if self.going.mean() > KEPT_PART else self.kept
-        return not slower_refutes(seconds, self.force, self.regressors, told, self.smoother)
+        kept = self.going if self._keeps_going else self.kept
+        return not slower_refutes(seconds, self.force, self.regressors, kept, self.smoother)
+
+    @property
+    def _keeps_going(self) -> bool:
+        """Whether enough of the log moves one way to tell a lag."""
+        return bool(self.going.mean() > KEPT_PART)
 
     @property
     def _changes_often(self) -> bool:

@@ -160,9 +160,10 @@ class Head:
         quoted = any('"' in line for line in lines)  # "0,1","0,2": one sign may be both
         styles = [Style(d, p) for d in delimiters for p in decimals if d != p or quoted]
         for columns in (2, 1):  # 1,5 is two columns, unless the map states delimiter or decimal
-            best = max(styles, key=lambda style: style.share_of_numbers(lines, columns))
-            if (share := best.share_of_numbers(lines, columns)) > 0.0:
-                level = [s for s in styles if s.share_of_numbers(lines, columns) == share]
+            shares = {style: style.share_of_numbers(lines, columns) for style in styles}
+            best = max(styles, key=lambda style: shares[style])
+            if shares[best] > 0.0:
+                level = [s for s in styles if shares[s] == shares[best]]
                 level.sort(key=lambda style: style.grouped(self.lines))
                 groups = [s for s in level if s.delimiter == best.delimiter and self._groups(s)]
                 return self._of_its_signs([*groups, *level][0])

@@ -168,6 +168,20 @@ def summed(axis, parts, column, values):
 
 
 @compiled(inline=True)
+def in_space(axis, rows, passive):
+    """Force (N) of an axis' structure effects that are no bodies, put on its base as well.
+
+    It acts in space: what the axis stands on takes no counterforce.
+    """
+    total = 0.0
+    for i in range(int(axis[8]), int(axis[4])):
+        total += rows[0, i]
+    if axis[9] >= 0.0:
+        passive[int(axis[9])] += total
+    return total
+
+
+@compiled(inline=True)
 def begin_sample(time, committed, start, after):
     """Make ``start`` the states at the start of this sample, and ``after`` a copy of them.
 
@@ -241,12 +255,7 @@ def passive_forces(block, data, off):
         force, _ = axis_force(
             entries, int(axes[a, 3]), int(axes[a, 4]), parameters, after, own, io, rows, 0
         )
-        inertial = 0.0  # such a force acts in space: what the axis stands on takes no counterforce
-        for i in range(int(axes[a, 8]), int(axes[a, 4])):
-            inertial += rows[0, i]
-        force += inertial
-        if axes[a, 9] >= 0.0:
-            passive[int(axes[a, 9])] += inertial
+        force += in_space(axes[a], rows, passive)
         for i in range(int(axes[a, 0]), int(axes[a, 1])):  # MuJoCo adds the command
             passive[int(parts[i, 1])] += parts[i, 2] * (force - command)
 
