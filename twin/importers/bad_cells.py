@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twin.errors import InputError
@@ -51,7 +51,7 @@ class BadCells:
         return bool(self._headers)
 
     @property
-    def columns(self) -> Collection[int]:
+    def columns(self) -> set[int]:
         """The columns with a bad cell in a row that has good ones."""
         bad = {row.line for _, row, good in self._bad_rows if not good}
         return {k for row, k in self._cells if row.line not in bad}
@@ -94,8 +94,8 @@ class BadCells:
                 out[index] = f"line {row.line} is a comment and left out: {row.text.strip()[:40]!r}"
         return LeftOut(tuple(sorted(out)), tuple(out[k] for k in sorted(out)))
 
-    def require_none(self, left_out: LeftOut) -> None:
-        """Raise InputError that names every bad cell of the other rows."""
+    def require_none(self, left_out: LeftOut, *, but_empty: bool = False) -> None:
+        """Raise InputError that names every bad cell of the other rows, or all but empty ones."""
         if self._headers:
             named = ", ".join(map(str, self._headers))
             one = len(self._headers) == 1
@@ -105,7 +105,10 @@ class BadCells:
                 f"{count} recordings in one file; cut it there and import each as a log of its own"
             )
         rows = {row.line for index, row, _ in self._bad_rows if index in left_out.rows}
-        cells = [(row, k) for row, k in self._cells if row.line not in rows]
+        cells = [
+            (row, k) for row, k in self._cells
+            if row.line not in rows and not (but_empty and not row.cell(k))
+        ]  # fmt: skip
         if not cells:
             return
         cells = sorted(cells + self._not_finite, key=lambda cell: (cell[0].line, cell[1]))

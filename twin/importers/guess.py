@@ -16,6 +16,7 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
+from twin.importers.own_rows import on_one_clock
 from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
@@ -141,6 +142,8 @@ def propose(path: Path) -> Proposal:
     """What is proposed for a file of any of the formats; raises InputError without a column."""
     with reading(path):
         table = table_of(path, EVERY_COLUMN)
+        one = on_one_clock(table)
+        table = table if one is None else one.table
         columns, holes = _distinct(table)
         if not columns:
             raise InputError("has no column of numbers; give another file")
@@ -150,6 +153,9 @@ def propose(path: Path) -> Proposal:
                 "sideways, a signal a row? turn it, or give a map that names the columns"
             )
     stated = find_time_base(table, columns)
+    if one is not None:
+        clock = f"resample = {one.rate:g} # Hz, because each column has rows of its own"
+        stated = replace(stated, lines=(*stated.lines, clock))
     moving = {n: c for n, c in columns.items() if n not in stated.used and np.ptp(c) > 0.0}
     known, made = not stated.missing, made_positions(moving)
     moving |= {m.name.column: m.values for m in made}

@@ -22,6 +22,7 @@ from twin.errors import InputError, at
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.mapping import ImportMap, load_mapping
+from twin.importers.own_rows import bridged
 from twin.importers.stamps import with_times
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable, numbers
@@ -254,7 +255,7 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
             columns[c.name] = unwrapped(columns[c.name], c.wraps)
     _common_length(columns)
     if mapping.time is not None:
-        raw = np.asarray(table.columns[mapping.time.name])
+        raw = mapping.time.raw(table.columns)
         if raw.dtype.kind in "Mm" and mapping.time.seconds != 1.0:
             raise InputError(f"column '{mapping.time.name}' holds dates; state its unit as s")
         times, jumps = times_of(mapping.time.name, raw, mapping.time.seconds)
@@ -267,8 +268,7 @@ def _read(path: Path, mapping: ImportMap) -> _Recording:
             times, columns = times[order], {n: c[order] for n, c in columns.items()}
             said.append(f"rows out of order in {out} places, the first row {first}; put in order")
         if holes:
-            good = np.all([np.isfinite(c) for c in columns.values()], axis=0)
-            times, columns = times[good], {n: c[good] for n, c in columns.items()}
+            times, columns = bridged(times, columns)
             said += [f"{hole.partition(';')[0]}; bridged by a straight line" for hole in holes]
         again = repeated_rows(columns, times)
         if mapping.resample is None and len(again):  # a clock leaves them out, and tells

@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
 from twin.entries import Entries, read_entries, toml_document
@@ -36,7 +37,7 @@ from twin.errors import InputError, at
 from twin.importers.units import COUNTS, Unit, find_unit
 from twin.logs.container import reading
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
-from twin.logs.topics import IDENTIFIER
+from twin.logs.topics import IDENTIFIER, is_calendar
 
 PER_ENCODER = ("counts_per_turn", "counts_per_metre")
 AXIS_NAME = rf"^{IDENTIFIER.pattern}$"
@@ -52,6 +53,13 @@ class _Column(Entries):
         return str(self.column)
 
 
+class RestMap(_Column):
+    """The column of what is left of each second, as the nanoseconds of a stamp of ROS."""
+
+    unit: str
+    """a unit of time in quotes, such as "ns" """
+
+
 class TimeMap(_Column):
     """The column of the time stamps, or of a counter of the samples."""
 
@@ -59,6 +67,8 @@ class TimeMap(_Column):
     """a unit of time in quotes, such as "s", "ms" or "us"; or step"""
     step: float | None = Field(None, gt=0.0)
     """a number above 0: s for one, of a column that counts the samples"""
+    plus: RestMap | None = None
+    """the column of what is left of each second, which is added"""
 
     @property
     def seconds(self) -> float:
@@ -67,9 +77,24 @@ class TimeMap(_Column):
             raise InputError('give unit, such as "s", or step (s for one, of a counter of samples)')
         return self.step or find_unit(self.unit or "", "s").size
 
-    def to_si(self, raw: Array) -> Array:
-        """Times (n,) of the column in s."""
-        return np.asarray(self.seconds * raw)
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The columns of its file that it is made of."""
+        return (self.name,) if self.plus is None else (self.name, self.plus.name)
+
+    def raw(self, columns: Mapping[str, NDArray]) -> NDArray:
+        """The times (n,) of the columns of its file: in its unit, or dates.
+
+        Whole seconds since 1970 and their rest are a date, as a number would lose its digits.
+        """
+        whole = np.asarray(columns[self.name])
+        if self.plus is None:
+            return whole
+        rest = np.asarray(columns[self.plus.name]) * find_unit(self.plus.unit, "s").size
+        if len(whole) and is_calendar(self.seconds * float(whole[0])):
+            ns = np.rint(self.seconds * whole).astype(np.int64) * 10**9
+            return (ns + np.rint(rest * 1e9).astype(np.int64)).astype("datetime64[ns]")
+        return whole + rest / self.seconds
 
 
 class ColumnMap(_Column):
@@ -335,7 +360,7 @@ class ImportMap(_File):
 
     def column_names(self) -> tuple[str, ...]:
         """The columns that are read, each once."""
-        names = [self.time.name] if self.time else []
+        names = [*self.time.parts] if self.time else []
         return tuple(
             dict.fromkeys([*names, *(n for c in self.columns() for n in c.parts), *self.scalars()])
         )

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.stated_rate import StatedRate, stated_rate
 from twin.importers.table import SignalTable, mixed_rows
 from twin.importers.time_base import (
@@ -25,37 +24,11 @@ from twin.importers.time_base import (
     repeated_rows,
     rows_a_stamp,
     simple_rate,
-    times_of,
 )
-from twin.importers.units import find_unit, is_unit
+from twin.importers.time_columns import Times, candidates, continued, counts, is_time
+from twin.importers.units import find_unit
 from twin.logs.log import Array
 
-_WORDS = {
-    "time", "timestamp", "timestamps", "stamp", "t", "ts", "zeit", "zeitstempel", "uhrzeit",
-    "clock", "temps", "heure", "tiempo", "elapsed", "epoch", "uptime", "millis", "micros", "nanos",
-    "ms", "us", "ns", "sec", "secs", "seconds", "datetime", "时间", "时间戳", "時間", "時刻",
-}  # fmt: skip
-_COUNTING = {
-    "n", "k", "sample", "samples", "index", "idx", "row", "count", "cnt", "counter", "cycle",
-    "cycles", "tick", "ticks", "seq", "sequence", "frame", "nr", "no", "number", "序号",
-}  # fmt: skip
-_UNIT_NAMES = {"millis": "ms", "micros": "us", "nanos": "ns", "ms": "ms", "us": "us", "ns": "ns",
-               "usec": "us", "msec": "ms", "nsec": "ns", "sec": "s", "secs": "s", "seconds": "s",
-               "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns",
-               "s": "s"}  # fmt: skip
-# Between which numbers a column counts a unit of time since a known day, from 1990 to 2060.
-_EPOCHS = (
-    (3.3e4, 5.9e4, "day", "days of a spreadsheet"),
-    (7.26e5, 7.53e5, "day", "days since the year 0"),
-    *(
-        (size * 6.3e8, size * 2.9e9, unit, f"{unit} since 1970")
-        for unit, size in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9))
-    ),
-    (1.22e17, 1.45e17, "100ns", "100 ns since 1601"),
-    (6.27e17, 6.51e17, "100ns", "100 ns since the year 1"),
-)
-_SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
-_SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _OFF = 0.02  # of a rate or a time, by which two clocks that are one do not differ
 _BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
 NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
@@ -77,38 +50,6 @@ class StatedTimeBase:
     asking: str = ""
 
 
-@dataclass(frozen=True)
-class _Times:
-    """A column that may be that of the times, in s (n,), with its unit and what tells that."""
-
-    name: str
-    seconds: Array
-    unit: str
-    reason: str
-    said: tuple[str, ...]
-
-    @property
-    def step(self) -> float:
-        """The usual step, s."""
-        return _usual(np.diff(self.seconds))
-
-    @property
-    def is_coarse(self) -> bool:
-        """Whether many rows have the time of the row before."""
-        return float((np.diff(self.seconds) == 0.0).mean()) > 0.1
-
-    @property
-    def duration(self) -> float:
-        """From its first to its last time, s."""
-        return float(self.seconds[-1] - self.seconds[0])
-
-    @property
-    def entry(self) -> str:
-        """Its entry in a map."""
-        column = json.dumps(self.name, ensure_ascii=False)
-        return f'{{column = {column}, unit = "{self.unit}"}}'
-
-
 def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTimeBase:
     """The time base of a table; columns: those of numbers (n,), all as long."""
     if table.sample_rate is not None:
@@ -117,12 +58,12 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
             (line,), 1.0 / table.sample_rate, tuple(n for n in columns if is_time(n))
         )
     counters = [name for name, column in columns.items() if counts(name, column)]
-    called, even = _candidates(table, columns, counters)
+    called, even = candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])
     rated = stated.rate if stated is not None else None
     found = called or _agreeing(even, rated, [*columns], counters)
     dates = (n for n in columns if np.asarray(table.columns[n]).dtype.kind == "M")
-    used = tuple(dict.fromkeys([*(f.name for f in found), *counters, *dates]))
+    used = tuple(dict.fromkeys([*(n for f in found for n in f.columns), *counters, *dates]))
     if found:
         base = _of_times(found, columns, stated, used)
         apart = _disagreeing_times(found, [*columns])
@@ -133,7 +74,7 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
     return _asked(columns, counters, stated, used)
 
 
-def _disagreeing_times(found: Sequence[_Times], names: Sequence[str]) -> str | None:
+def _disagreeing_times(found: Sequence[Times], names: Sequence[str]) -> str | None:
     """That a later column of times, with signals before and behind it, is another clock of these.
 
     Of messages each has stamps of its own, which may be late.
@@ -153,8 +94,8 @@ def _disagreeing_times(found: Sequence[_Times], names: Sequence[str]) -> str | N
 
 
 def _agreeing(
-    even: Sequence[_Times], stated: float | None, names: Sequence[str], counters: Sequence[str]
-) -> list[_Times]:
+    even: Sequence[Times], stated: float | None, names: Sequence[str], counters: Sequence[str]
+) -> list[Times]:
     """Of columns that nothing but even steps tells to be times the one that may be believed.
 
     One whose rate the file states; else the first column of all, where none counts the samples.
@@ -164,136 +105,8 @@ def _agreeing(
     return [one for one in even if one.name == names[0] and not counters]
 
 
-def is_time(name: str) -> bool:
-    """Whether a column is called as one of times."""
-    return bool(set(_words(name)) & _WORDS) or _unit_of(name) is not None
-
-
-def _words(name: str) -> list[str]:
-    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
-    return re.findall(r"[^\W\d_]+", spaced.lower())
-
-
-def _unit_of(name: str) -> str | None:
-    """The unit of time that a name ends with, or is."""
-    bracketed = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$", name)
-    if bracketed:
-        return bracketed[1] if is_unit(bracketed[1], "s") else None
-    words = _words(name)
-    last = words[-1] if words else ""
-    if last in ("s", "us", "ms", "ns") and len(words) > 1 and not set(words[:-1]) & _WORDS:
-        return None  # pos_ms is no time, as a_s is none
-    return _UNIT_NAMES.get(last)
-
-
-def counts(name: str, column: Array) -> bool:
-    """Whether a column (n,) counts the samples, with gaps or begun again, and tells no time."""
-    if _unit_of(name) is not None or (column != np.rint(column)).any() or len(column) < 3:
-        return False
-    if _since_epoch(column) is not None:
-        return False
-    steps = np.diff(_continued(column))
-    usual = float(np.median(steps))
-    if usual <= 0.0 or (steps <= 0.0).mean() > 0.01 or (steps != usual).mean() > 0.1:
-        return False
-    return usual == 1.0 or bool(set(_words(name)) & _COUNTING)
-
-
-def _continued(column: Array) -> Array:
-    """A counter without its beginning again."""
-    wraps = find_wraps(column)
-    return column if wraps is None else unwrapped(column, wraps.size)
-
-
-def _candidates(
-    table: SignalTable, columns: Mapping[str, Array], counters: Sequence[str]
-) -> tuple[list[_Times], list[_Times]]:
-    """The columns that are called as times, and others that rise as evenly as these."""
-    even, called = [], []
-    for name, column in columns.items():
-        raw = np.asarray(table.columns[name])
-        if name in counters or raw.dtype == np.dtype("datetime64[D]"):  # a date is in its times
-            continue
-        calendar = raw.dtype.kind in "Mm"
-        unit, reason = _unit(name, column, calendar)
-        try:
-            times, said = times_of(name, column if not calendar else raw, find_unit(unit, "s").size)
-        except InputError:
-            continue
-        steps = np.diff(times)
-        if not (steps > 0.0).any() or ((steps < 0.0).mean() > 0.01 and not calendar):
-            continue
-        one = _Times(name, times, unit, reason, said)
-        rising, level = float((steps > 0.0).mean()), float((steps == 0.0).mean())
-        if calendar or (is_time(name) and (rising > 0.5 or rows_a_stamp(times))):
-            called.append(one)
-        elif rising > 0.9 and level == 0.0 and _is_even(steps):
-            even.append(one)
-    called.sort(key=lambda one: one.is_coarse)
-    return called, even
-
-
-def _is_even(steps: Array) -> bool:
-    """Whether steps (n,) are those of a clock: all alike, or off by chance and not as a motion."""
-    spread, usual = float(np.ptp(steps)), float(np.median(steps))
-    chance = 0.05  # of the spread, by which steps that are off by chance differ from the next one
-    exact = spread < 0.01 * usual
-    # a program that waits for each sample is late at times, and never early
-    late = float(steps.min()) > 0.99 * usual and float((steps < 1.01 * usual).mean()) > 0.5
-    return (
-        exact
-        or late
-        or (spread < 0.5 * usual and float(np.mean(np.abs(np.diff(steps)))) > chance * spread)
-    )
-
-
-def _unit(name: str, column: Array, calendar: bool) -> tuple[str, str]:
-    """The unit of a column of times, and why."""
-    if calendar:
-        return "s", "dates and times" if len(column) else ""
-    step = _usual_step(column)
-    own = _unit_of(name)
-    if own is not None and 1.0 / (find_unit(own, "s").size * step) < 5.0 * _FASTEST:
-        return own, "its name states the unit"
-    if own is None and (epoch := _since_epoch(column)) is not None:
-        return epoch
-    fits = [u for u, size in _SIZES.items() if _SLOWEST <= size / step <= _FASTEST]
-    unit = fits[0] if fits else own or "s"
-    told = f"that is {_SIZES.get(unit, 1.0) / step:.6g} Hz"
-    if own is not None:
-        told += (
-            f", where the {own} of its name are {1.0 / (find_unit(own, 's').size * step):.6g} Hz"
-        )
-    seconds = own is None and _SIZES.get(unit, 1.0) == 1.0
-    return unit, told if seconds else f"unit ASSUMED: {told}"
-
-
-def _usual_step(column: Array) -> float:
-    steps = np.diff(_continued(column))
-    return _usual(steps) if (steps > 0.0).any() else 1.0
-
-
-def _usual(steps: Array) -> float:
-    """The usual step: the mean of those that are like the median one.
-
-    Of a clock that counts since long ago each step is rounded.
-    """
-    middle = np.median(steps[steps > 0.0])
-    return float(np.mean(steps[np.abs(steps - middle) <= 0.1 * middle]))
-
-
-def _since_epoch(column: Array) -> tuple[str, str] | None:
-    """The unit of times that count since a known day, and why; None where none is as large."""
-    first, step = float(column[0]), _usual_step(column)
-    for low, high, unit, since in _EPOCHS:
-        rate = 1.0 / (find_unit(unit, "s").size * step)
-        if low < first < high and _SLOWEST <= rate <= _FASTEST:
-            return unit, f"as many {since}, that is {rate:.6g} Hz"
-    return None
-
-
 def _of_times(
-    found: Sequence[_Times], columns: Mapping[str, Array], stated: StatedRate | None,
+    found: Sequence[Times], columns: Mapping[str, Array], stated: StatedRate | None,
     used: tuple[str, ...],
 ) -> StatedTimeBase:  # fmt: skip
     """The time base by the best of several columns of times."""
@@ -358,7 +171,7 @@ def _has_rate(times: Array) -> bool:
     return True
 
 
-def _best(found: Sequence[_Times]) -> tuple[_Times, str]:
+def _best(found: Sequence[Times]) -> tuple[Times, str]:
     """The column of times to take, and why where another is wrong.
 
     Of a message the stamp is that of its measurement, and its log time when it was recorded: where
@@ -441,7 +254,7 @@ class _Count:
 
 
 def _count_of(column: Array) -> _Count:
-    steps = np.diff(_continued(column))
+    steps = np.diff(continued(column))
     by = float(np.median(steps))
     lost = int(np.sum(np.maximum(steps / by - 1.0, 0.0)))
     k = int(np.argmax(np.diff(column) > by))

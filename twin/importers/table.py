@@ -85,6 +85,8 @@ class SignalTable:
     def _others(self, values: Array) -> str:
         """How many values (n,) are none, and the lines, or rows, of those behind the first."""
         bad = np.flatnonzero(~np.isfinite(values))
+        if 2 * len(bad) > len(values) / 5:  # no slip, but rows of another column
+            return f"{len(bad)} in all"
         behind = bad[1 : MOST_NAMED + 1] + (1 if self.first_line is None else self.first_line)
         if not len(behind):
             return "1 in all"

@@ -7,7 +7,6 @@ the file (``Head``); ``read_table`` reads all rows. Cells that are no numbers ar
 from __future__ import annotations
 
 import codecs
-import csv
 import itertools
 import re
 from collections import Counter
@@ -24,8 +23,10 @@ from numpy.typing import NDArray
 from twin.errors import InputError
 from twin.importers.bad_cells import BadCells, BadRow
 from twin.importers.mapping import ImportMap
-from twin.importers.proposal.lexicon import words_of_the_far_east
+from twin.importers.proposal.lexicon import words_of_other_scripts
+from twin.importers.proposal.names import unit_of
 from twin.importers.stamps import Stamps, is_date, is_stamp, joined_with_dates
+from twin.importers.style import Style, quantity_of
 from twin.importers.table import SignalTable, chosen, with_unit
 
 ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".prn")
@@ -34,97 +35,9 @@ _DELIMITERS = (",", ";", "\t", "|", None)  # None: any white space
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")
 )  # fmt: skip
-_SECONDS = {"sec": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "hr": 3600.0}
-_WITH_UNIT = re.compile(rf"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s+({'|'.join(_SECONDS)})")  # of MATLAB
-_BY_POINTS = re.compile(r"(?<![\d:.])[1-9]\d{0,2}(\.\d{3})+(?![\d.])")  # 1.234, in no time of day
 _HUNDREDS = re.compile(r"[-+]?[1-9]\d\d")  # a whole number just below a thousand
 _ENDS = re.compile(r"\r\n|\r|\n")
 _BLOCK = 1024  # lines read at once: few enough that one bad cell makes few of them slow
-
-
-@dataclass(frozen=True)
-class Style:
-    """How a line is cut into cells, and how a cell is a number.
-
-    grouping: whether the sign that is not the decimal one groups thousands, as in 1.234,5; else a
-    file mixes both as decimal signs.
-    """
-
-    delimiter: str | None
-    decimal: str
-    grouping: bool = True
-
-    def cells(self, line: str) -> list[str]:
-        """The cells of a line; one that begins with # or % has no other first cell for that."""
-        text = line.strip(" \r\n").removeprefix("#").removeprefix("%").strip(" ")
-        if self.delimiter is None:
-            return text.split()
-        if '"' not in text:  # of a million lines nearly all
-            return [cell.strip() for cell in text.split(self.delimiter)] if text else []
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
-
-    def value(self, cell: str) -> float:
-        """The number in a cell, which may group its thousands; raises ValueError."""
-        if self.decimal == "," and "." in cell and self.is_grouped(cell):
-            return self._less_groups(cell)
-        try:
-            return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
-        except ValueError:
-            if "\u2212" in cell:  # the minus of typography
-                return self.value(cell.replace("\u2212", "-"))
-            if re.fullmatch(r"[-+\d.,]+[dD][-+]?\d+", cell):  # of Fortran: 1.5D-03
-                return self.value(re.sub("[dD]", "e", cell))
-            if re.fullmatch(r"[-+]?0[xX][\da-fA-F]+", cell):  # of a register: 0x1A2B
-                return float(int(cell, 16))
-            if (found := _WITH_UNIT.fullmatch(cell)) is not None:
-                return self.value(found[1]) * _SECONDS[found[2]]
-            if not self.is_grouped(cell):
-                raise
-            return self._less_groups(cell)
-
-    def is_grouped(self, cell: str) -> bool:
-        """Whether a cell is a number with grouped thousands, which never begins with 0."""
-        return self._grouped.fullmatch(cell) is not None
-
-    def has_grouped(self, line: str) -> bool:
-        """Whether any part of a line may be such a number by the other sign."""
-        return self.grouping and _BY_POINTS.search(line) is not None
-
-    @cached_property
-    def _grouped(self) -> re.Pattern[str]:
-        other = {",": ".", ".": ","}[self.decimal] if self.grouping else ""
-        return re.compile(
-            rf"[-+]?[1-9]\d{{0,2}}([{other}'’\s])\d{{3}}(\1\d{{3}})*({re.escape(self.decimal)}\d+)?"
-        )
-
-    def _less_groups(self, cell: str) -> float:
-        signs = {c for c in cell if not c.isalnum() and c not in "+-"} - {self.decimal}
-        return float("".join(c for c in cell if c not in signs).replace(self.decimal, "."))
-
-    def is_number(self, cell: str) -> bool:
-        """Whether a cell is a number."""
-        try:
-            self.value(cell)
-        except ValueError:
-            return False
-        return True
-
-    def share_of_numbers(self, lines: Sequence[str], columns: int) -> float:
-        """Of the cells of ``lines``; 0 where most of them have fewer than so many columns."""
-        rows = [self.cells(line) for line in lines]
-        if sum(len(row) >= columns for row in rows) * 2 <= len(rows):
-            return 0.0
-        cells = list(itertools.chain.from_iterable(rows))
-        return sum(map(self.is_number, cells)) / max(len(cells), 1)
-
-    def grouped(self, lines: Sequence[str]) -> int:
-        """How many cells are numbers with grouped thousands, or none where the other sign counts.
-
-        Of two styles that read as many numbers the plainer is right: 1,234 is no thousand where
-        every number has three digits behind its comma, and 0,012 is none at all.
-        """
-        cells = [cell for line in lines for cell in self.cells(line)]
-        return sum(self.is_grouped(c) or not self.is_number(c) for c in cells)
 
 
 @dataclass(frozen=True)
@@ -209,13 +122,13 @@ def _encoding(head: bytes) -> str:
 def _of_windows(head: bytes) -> str:
     """What programs on Windows write where it is not UTF-8: in which words of recorders are there.
 
-    Of the Far East one in which such words are found; else that of the West.
+    Of Russia or the Far East one in which such words are found; else that of the West.
     """
     found = {}
-    for encoding in ("shift_jis", "gb18030", "big5", "cp949"):
+    for encoding in ("cp1251", "shift_jis", "gb18030", "big5", "cp949"):
         with suppress(UnicodeDecodeError):
-            text = head.decode(encoding)
-            found[encoding] = sum(len(word) for word in words_of_the_far_east() if word in text)
+            text = head.decode(encoding).lower()
+            found[encoding] = sum(len(word) for word in words_of_other_scripts() if word in text)
     best = max(found, key=lambda encoding: found[encoding], default="cp1252")
     return best if found.get(best) else "cp1252"
 
@@ -246,8 +159,21 @@ class Layout:
 
     def called(self, asked: Collection[str]) -> list[str]:
         """The names of the columns, with their units unless they are asked for without."""
-        units = self.units or ("",) * len(self.names)
-        return [with_unit(n, u, asked) for n, u in zip(self.names, units, strict=True)]
+        return [with_unit(n, u, asked) for n, u in zip(self.names, self.all_units, strict=True)]
+
+    @cached_property
+    def all_units(self) -> tuple[str, ...]:
+        """Of each column its unit, "" of one without: that stated for it, or beside its numbers."""
+        stated = self.units or ("",) * len(self.names)
+        return tuple(u or self._unit_beside(k) for k, u in enumerate(stated))
+
+    def _unit_beside(self, column: int) -> str:
+        """The unit of a column whose cells have one each: that of its name, else the usual one."""
+        cells = [row[column] for row in self.rows if column < len(row)]
+        beside = Counter(q[1] for cell in cells if (q := quantity_of(cell)) is not None)
+        if 2 * beside.total() <= len(cells) or not beside:
+            return ""
+        return unit_of(self.names[column], bracketed=True) or beside.most_common(1)[0][0]
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
@@ -285,7 +211,8 @@ def read_table(path: Path, mapping: ImportMap, layout: Layout) -> SignalTable:
         raise InputError(_of_text(layout, *next(iter(text.items()))))
     where = [k for name, k in places.items() if name not in text]
     cut = mapping.rows is not None  # what is no number may be in the others
-    read, more, in_line = _rows(path, layout, where, every=cut or not asked)
+    bridges = mapping.resample is not None
+    read, more, in_line = _rows(path, layout, where, every=cut or not asked, bridges=bridges)
     said = (*layout.said, *more)
     first_line = layout.skip + 1 if in_line else None
     for k in text.values():
@@ -323,14 +250,14 @@ def _dates_of(wanted: Iterable[str], layout: Layout, names: Sequence[str]) -> di
 
 
 def _rows(
-    path: Path, layout: Layout, where: Sequence[int], every: bool
+    path: Path, layout: Layout, where: Sequence[int], every: bool, bridges: bool
 ) -> tuple[dict[int, NDArray], tuple[str, ...], bool]:
     """The columns at some places, and sentences about the lines that are no rows.
 
     Last, whether each line up to the last row is a row, so that one's number tells the other's.
 
-    every: all are read, to be looked at or cut, so that what is no number is NaN there. Raises
-    InputError that names all bad cells.
+    every: all are read, to be looked at or cut, so that what is no number is NaN there; bridges:
+    an empty cell is. Raises InputError that names all bad cells.
     """
     rows = _Rows(layout, where, _header_cells(path, layout))
     with closing(layout.lines(path)) as lines:
@@ -338,7 +265,7 @@ def _rows(
             rows.add(block)
     bad, left_out = rows.bad, rows.bad.left_out()
     if not every or bad.has_header or any(k in bad.columns for k in rows.stamps):
-        bad.require_none(left_out)
+        bad.require_none(left_out, but_empty=bridges and bad.columns.isdisjoint(rows.stamps))
     kept = rows.columns(left_out.rows)
     in_line = rows.blank == 0 and all(k >= rows.count - len(left_out.rows) for k in left_out.rows)
     return kept, left_out.said, in_line
@@ -415,7 +342,8 @@ class _Rows:
     def _value(self, row: BadRow, place: int) -> float:
         cell, stamps = row.cell(place), self.stamps.get(place)
         try:
-            value = self._layout.style.value(cell) if stamps is None else stamps.add(cell)
+            unit = self._layout.all_units[place]
+            value = self._layout.style.value(cell, unit) if stamps is None else stamps.add(cell)
         except ValueError:
             self.bad.add(row, place)
             return np.nan if stamps is None else -1

@@ -181,7 +181,7 @@ def rate_of(time: Array) -> float:
         (f"is off the even grid by up to {100.0 * off.max():.3g} % of a sample", off > jitter),
     ):
         if wrong.any():
-            _require_no_hole(time)  # which a clock would not mend
+            require_no_hole(time)  # which a clock would not mend
             row = int(np.argmax(wrong))
             if (coarse := rows_a_stamp(time)) is not None:
                 raise InputError(
@@ -225,7 +225,8 @@ def _as_rows(parts: Sequence[tuple[int, int]]) -> str:
     return f"import each part as a log of its own, with {shown} in the map"
 
 
-def _require_no_hole(time: Array) -> None:
+def require_no_hole(time: Array) -> None:
+    """Raise InputError where times (n,) in s have a hole over which a line is no measurement."""
     parts = parts_of(time)
     if len(parts) > 1:
         gap = parts[0][1]
@@ -297,5 +298,5 @@ def time_base_of(time: Array, rate: float) -> TimeBase:
         raise InputError(
             f"resample = {rate:g} Hz, but the rows come at about {1.0 / usual:.4g} Hz; give that"
         )
-    _require_no_hole(kept)
+    require_no_hole(kept)
     return TimeBase(rows, kept, even_times(kept[0], kept[-1], rate), len(time) - len(kept))

@@ -12,7 +12,7 @@ from typing import Any
 
 from twin.errors import InputError
 
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "day": 86400.0}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0}
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}
 _ANGLE = {
     "rad": 1.0,
@@ -56,6 +56,7 @@ _QUANTITIES: Mapping[str, Mapping[str, float]] = {
     "K": {"K": 1.0, "degC": 1.0, "°C": 1.0},
     "N m": {**_prefixed("Nm"), "mNmm": 1e-6, "Nmm": 1e-3, "Ncm": 1e-2},
 }
+QUANTITIES = tuple(_QUANTITIES)  # by their SI units
 CELSIUS, ICE = ("degC", "°C"), 273.15  # K, their zero
 # what only a scale turns into a physical quantity
 COUNTS = ("count", "counts", "cts", "cnt", "increment", "increments", "inc", "incs", "digit",

@@ -8,6 +8,8 @@ from import_cases import COUNT, MAP, guess_map, mapping, table
 
 from twin.errors import InputError
 from twin.importers import import_log, import_notes
+from twin.importers.importer import table_of
+from twin.importers.mapping import EVERY_COLUMN
 from twin.logs import Log
 
 
@@ -138,7 +140,7 @@ def with_row(number: int, row: str) -> str:
         (with_row(40, "0.02"), "line 41, column 'q': is empty"),
         (with_row(40, "0.02,nan,1,0"), r"column 'q' is nan in row 40 of 300 \(line 41\), 1 in all"),
         (PLAIN.replace("q,", "qq,"), "no column 'q'; did you mean 'qq'. columns: t, qq, i, unused"),
-        (PLAIN.replace("t,", "q,", 1), "2 columns are called 'q'"),
+        (PLAIN.replace("t,", "q,", 1), "no column 'q'; did you mean .*columns: q 1, q 2"),
         (PLAIN.replace(",unused", ""), "line 1 has 3 names, the rows have 4 cells"),
         ("", "no line of text"),
         ("t,q\nsome,words\n", "no rows of numbers"),
@@ -203,3 +205,26 @@ def test_counts_in_hexadecimals_are_read(tmp_path):
         'force = {column = "i", unit = "N"}\n',
     )  # fmt: skip
     np.testing.assert_allclose(log.axes["x"].position, 1e-6 * counts, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("above", "names"),
+    [
+        (
+            ",Axis X,,Axis Y,\n",
+            ("t", "Axis X q [mm]", "Axis X f [N]", "Axis Y q [mm]", "Axis Y f [N]"),
+        ),
+        ("", ("t", "q 1 [mm]", "f 1 [N]", "q 2 [mm]", "f 2 [N]")),
+        ("Oscilloscope,,,,\n", ("t", "q 1 [mm]", "f 1 [N]", "q 2 [mm]", "f 2 [N]")),
+    ],
+)
+def test_columns_of_one_name_are_told_apart(
+    tmp_path: Path, above: str, names: tuple[str, ...]
+) -> None:
+    """By the groups above them, else by a number: none is lost."""
+    rows = "".join(f"{k},{k + 1},{k + 2},{k + 3},{k + 4}\n" for k in range(20))
+    path = tmp_path / "a.csv"
+    path.write_text(f"{above}t,q [mm],f [N],q [mm],f [N]\n{rows}")
+    columns = table_of(path, EVERY_COLUMN).columns
+    assert tuple(columns) == names
+    assert [column[0] for column in columns.values()] == [0.0, 1.0, 2.0, 3.0, 4.0]

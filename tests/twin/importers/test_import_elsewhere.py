@@ -308,4 +308,4 @@ def test_names_between_a_title_and_units_and_times_with_a_unit_in_each_cell(tmp_
     assert "Lage-Istwert [mm]" in table_of(tmp_path / "a.csv", EVERY_COLUMN).columns
     (tmp_path / "b.csv").write_text("Time,q,u\n" + rows("{:.4f} sec,{:.6f},{:.5f}\n"))
     columns = table_of(tmp_path / "b.csv", EVERY_COLUMN).columns
-    np.testing.assert_allclose(columns["Time"], 0.002 * np.arange(400), atol=1e-9)
+    np.testing.assert_allclose(columns["Time [sec]"], 0.002 * np.arange(400), atol=1e-9)

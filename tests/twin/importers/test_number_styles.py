@@ -141,7 +141,44 @@ def test_a_line_is_told_where_its_number_is_known(
 
 
 def test_columns_of_words_are_told_where_a_signal_is_looked_for(tmp_path: Path) -> None:
-    rows = [f"{t},{x},{f}%" for t, x, f in zip(T, X, F, strict=True)]
+    rows = [f"{t},{x},{f} parts" for t, x, f in zip(T, X, F, strict=True)]
     path = tmp_path / "table.csv"
     path.write_text("\n".join(["t,x,Torque", *rows]))
-    assert "column 'Torque' holds text, such as '2345.0%', and no numbers" in refusal_of(path)
+    assert "column 'Torque' holds text, such as '2345.0 parts', and no numbers" in refusal_of(path)
+
+
+def scaled(value: float, unit: str) -> str:
+    """A number as Grafana shows it, in a unit that makes it neither large nor small."""
+    size, prefix = (1.0, "") if abs(value) >= 1.0 else (1e3, "m")
+    return f"{value * size:.4f} {prefix}{unit}"
+
+
+@pytest.mark.parametrize(
+    ("position", "cell"),
+    [
+        ("x", lambda v: f"{1e3 * v:.1f} mm"),
+        ("x", lambda v: f"{1e3 * v:.1f}mm"),
+        ("x [m]", lambda v: f"{1e3 * v:.1f} mm"),  # of which one is so many of its name's
+        ("x", lambda v: scaled(v, "m")),
+        ("x", lambda v: comma(f"{1e3 * v:.3f}") + " mm"),
+    ],
+)
+def test_cells_with_their_units(
+    tmp_path: Path, position: str, cell: Callable[[float], str]
+) -> None:
+    lines = [f"{1e3 * t:.0f} ms;{cell(x)};{f:.0f} N" for t, x, f in zip(T, X, F, strict=True)]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join([f"t;{position};F", *lines]))
+    log = import_log(path, parse_mapping(propose(path).map_text({})))
+    np.testing.assert_allclose(log.axes["x"].position, X, atol=1e-6)
+    np.testing.assert_allclose(log.axes["x"].force, F, atol=1e-6)
+    assert log.sample_rate == 1000.0
+
+
+def test_a_cell_in_the_unit_of_another_quantity_is_no_number(tmp_path: Path) -> None:
+    lines = [f"{t:.3f} s,{x:.3f} m,{f:.0f} N" for t, x, f in zip(T, X, F, strict=True)]
+    lines[700] = lines[700].replace(" m,", " V,")
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["t,x,F", *lines]))
+    with pytest.raises(InputError, match=f"line 702, column 'x': '{X[700]:.3f} V' is not a number"):
+        import_log(path, parse_mapping(MAP))

@@ -50,6 +50,14 @@ f  N   .       Effort (N)
 v  rpm .       Vitesse [tr/min]
 v  mm/s .      vel_mm_s
 v  deg/s .     speed_dps
+pm mm  .       Фактическое положение, мм
+pr mm  .       Заданное положение [мм]
+vm mm/s .      Скорость (факт), мм/с
+v  rpm .       Скорость двигателя, об/мин
+f  Nm  x       Момент X, Н·м
+im A   .       Ток двигателя (измеренное) [А]
+-  .   .       Ошибка положения, мм
+p  deg y       Угол Y (град)
 f  Nm  .       torque_nm
 f  %   .       torque_pct
 f  %   .       torque [% Mn]

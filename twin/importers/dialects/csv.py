@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 from twin.errors import InputError
@@ -19,8 +19,9 @@ from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.proposal.names import units_of
 from twin.importers.stamps import is_date, is_stamp
+from twin.importers.style import Style
 from twin.importers.table import SignalTable, mixed_rows, parsing
-from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
+from twin.importers.text import ENDINGS, Head, Layout, read_table
 from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
@@ -53,13 +54,17 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     if header is not None:  # a row with a bad cell is one, too
         between = range(header + 1, skip)
         skip = next((k for k in between if _good(rows[k], counting, style)), skip)
-    some = rows[skip :: max(1, (len(rows) - skip) // _SOME)]
+    # Of all the beginning, and some that follow each other: of several recorders in turn each is in
+    # the latter.
+    some = [*rows[skip :: max(1, (len(rows) - skip) // _SOME)], *rows[skip : skip + _SOME]]
     if header is None:
         names: tuple[str, ...] = tuple(str(k + 1) for k in range(width))
         return Layout(head.encoding, style, names, skip, some)
     given = [len(named[header]) for named in (rows, spaced)]
     several = given[0] != width and (given[1] == width or given[0] < width)  # words a name
-    names = _names(spaced[header] if several else rows[header], rows[skip])
+    named = spaced if several else rows
+    groups = named[header - 1] if header > 0 else ()
+    names = _told_apart(_names(named[header], rows[skip]), groups)
     units = _units(rows[header + 1 : skip], names)
     _require_samples(names, rows[skip : skip + _SOME], style)
     return Layout(head.encoding, style, names, skip, some, units, header)
@@ -199,6 +204,28 @@ def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
         names.insert(place, "date")
     names += [""] * (len(row) - len(names))
     return tuple(name or str(k + 1) for k, name in enumerate(names))
+
+
+def _told_apart(names: Sequence[str], groups: Sequence[str]) -> tuple[str, ...]:
+    """Names of which each is there once: by the groups of columns above them, else by a number.
+
+    groups: the cells of the line above, each the name of its column and of those behind it that
+    have none.
+    """
+    if len(set(names)) == len(names):
+        return tuple(names)
+    of_each = accumulate((*groups, *[""] * len(names)), lambda group, cell: cell or group)
+    grouped = tuple(f"{g} {n}".strip() for g, n in zip(of_each, names, strict=False))
+    if len(set(grouped)) == len(names):
+        return grouped
+    counts, again = Counter[str](), Counter(names)
+    out = []
+    for name in names:
+        counts[name] += 1
+        bracket = "".join(re.findall(r"\s*[\[(][^\])]*[\])]$", name))
+        bare = name.removesuffix(bracket)
+        out.append(f"{bare} {counts[name]}{bracket}" if again[name] > 1 else name)
+    return tuple(out)
 
 
 def _unit(cell: str) -> str:

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
+from twin.importers.style import Style
 from twin.importers.table import SignalTable, parsing
-from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
+from twin.importers.text import ENDINGS, Head, Layout, read_table
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|nan|inf)"
 _LINE = re.compile(rf"(?:{_NUMBER} )+|(?:\d+ )?overrun", re.IGNORECASE)

@@ -12,8 +12,9 @@ from pathlib import Path
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
+from twin.importers.style import Style
 from twin.importers.table import SignalTable, parsing
-from twin.importers.text import ENDINGS, Head, Layout, Style, read_table
+from twin.importers.text import ENDINGS, Head, Layout, read_table
 
 TIME = "time"
 END = "EOF"  # the last line of an export, where it was asked for

@@ -64,7 +64,7 @@ UNITS: Mapping[Quantity, Mapping[str, str]] = _by(Quantity, _FILE["units"])
 
 
 @cache
-def words_of_the_far_east() -> frozenset[str]:
+def words_of_other_scripts() -> frozenset[str]:
     """Those of several signs that are not Latin."""
     words = " ".join((*QUANTITIES.values(), *ROLES.values()))
-    return frozenset(w for w in words.split() if len(w) > 1 and ord(w[0]) > 0x2E7F)
+    return frozenset(w for w in words.split() if len(w) > 1 and ord(w[0]) > 0x3FF)

@@ -27,13 +27,14 @@ from twin.importers.units import is_unit
 
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ω": " omega ", "τ": " tau ", "α": " alpha "})
 _CJK = "\u3040-\u30ff\u3400-\u9fff"
-_TOKENS = re.compile(rf"[{_CJK}]+|[a-z]+|\d+")
+_TOKENS = re.compile(rf"[{_CJK}]+|[a-zа-я]+|\d+")
 _OF_ANOTHER = frozenset("%")  # parts of another size, which no place is
 _LONE = re.compile(r"(?<![^\W\d_])[À-ÖØ-öø-ÿ](?![^\W\d_])")  # of Russian read as of the West
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*?)\s*[\])>}]")
 _PATH = re.compile(r"[./:](?=[^./:]*[^\W\d_]{2})")
-_TAIL = re.compile(r"(?:\s+in\s+|[_ ,/.]\s*)([A-Za-zµμ°%²]+(?:[_/][A-Za-z]+[2²]?)?)$")
-_PER = re.compile(r"(?i)^(.+?)(?:\s*[/_ ]\s*(s|ms|min|second)|ps)(?:\^?2|²)?$")
+_TAIL = re.compile(r"(?:\s+in\s+|[_ ,/.]\s*)([A-Za-zА-я·µμ°%²]+(?:[_/][A-Za-zА-я]+[2²]?)?)$")
+_PER = re.compile(r"(?i)^(.+?)(?:\s*[/_ ]\s*(s|ms|min|second|с|мс|мин)|ps)(?:\^?2|²)?$")
+_PERIODS = str.maketrans({"с": "s", "м": "m", "и": "i", "н": "n"})
 _SHARE = re.compile(
     r"(?i)^(?:(0[.,]1 ?%|‰|0/00|o/oo|per ?mille?|promille)|%|percent|pct|prozent)"
     r"(?: (?:[a-z]n|of)?(?: ?rated| ?nominal| ?nenn\w*)?(?: ?torque| ?current| ?\w?moment)?)?$"
@@ -180,7 +181,7 @@ def units_of(text: str) -> tuple[tuple[Quantity, str], ...]:
     if rate := _PER.match(text):
         of = [u for q, u in units_of(rate[1]) if q is Quantity.POSITION]
         kind = Quantity.ACCELERATION if _SQUARED.search(text) else Quantity.VELOCITY
-        suffix = f"/{(rate[2] or 's')[:3].replace('sec', 's')}"
+        suffix = f"/{(rate[2] or 's')[:3].translate(_PERIODS).replace('sec', 's')}"
         suffix += "^2" if kind is Quantity.ACCELERATION else ""
         return tuple((kind, u + suffix) for u in of)
     return ()
