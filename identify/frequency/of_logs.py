@@ -65,8 +65,9 @@ def responses_of(
     names = [a for a in names if model is None or a in model.axes]
     if not names:
         raise InputError(
-            "no axis moves under a changing force in all of the logs; give logs of one axis that "
-            "moves, named as in the model"
+            "no axis has in all of the logs a force that changes and a setpoint that moves (a "
+            "position, where none is logged); give logs of one axis that moves, named as in the "
+            "model"
         )
     simulated = {} if model is None else _simulated(logs, model, progress)
     axes = {}

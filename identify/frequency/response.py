@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +114,9 @@ def response(records: Sequence[LoopSignals], count: int = 200, width: float = 0.
     # the same highest frequency
     grid = np.geomspace(lowest, 0.45 / period, count)
     grid = np.unique(np.rint(grid * longest)) / longest
+    if lines := [s.lines / (s.cells * period) for s in spectra if s.is_sparse]:
+        excited = np.unique(np.concatenate(lines))
+        grid = excited[np.unique(np.abs(excited - grid[:, None]).argmin(axis=1))]
     found = _together(grid, [[s.about(f, width) for f in grid] for s in spectra], period)
     if all(record.setpoint is not None for record in records):
         return found
@@ -152,7 +156,7 @@ class _Spectra:
         signals = np.stack([drive, record.force, record.position])
         bent = np.diff(signals, 2)  # which has no trend: what drifts would leak everywhere
         n = bent.shape[1]
-        cells = n if record.setpoint is None else _repeats_after(bent[0])
+        cells = n if record.setpoint is None else _repeats_after(bent[0], drive)
         periods = n // cells - 2  # the first holds a transient, the last may end
         if periods < 2:
             turned = np.fft.rfft(bent) / np.sqrt(n)
@@ -165,19 +169,45 @@ class _Spectra:
         noise = np.einsum("ipm,jpm->mij", own, own.conj()) / ((periods - 1) * periods)
         return cls(mean[0], mean[1:].T, noise, cells, record.period)
 
+    @cached_property
+    def lines(self) -> NDArray[np.intp]:
+        """The lines that the setpoint has, where it repeats; else all."""
+        every = np.arange(1, len(self.instrument))
+        if self.noise is None:
+            return every
+        # Of the largest within an octave, and of all: less is rounding of the setpoint.
+        near, least, size = 1e-2, 1e-4, np.abs(self.instrument[1:])
+        largest = np.array([size[(k - 1) // 2 : 2 * k].max() for k in every])
+        return every[size > np.maximum(near * largest, least * size.max())]
+
+    @cached_property
+    def is_sparse(self) -> bool:
+        """Whether most lines of the band are none of the setpoint, as of odd or few lines."""
+        return bool(2 * (len(self.lines) - 1) <= self.lines[-1] - self.lines[0])
+
+    def _near(self, centre: float, width: float) -> NDArray[np.intp]:
+        """The lines as near as ``width`` to one, enough for the polynomials."""
+        half = max(round(width * centre), UNKNOWNS)
+        if self.is_sparse:
+            least = UNKNOWNS - 1  # two more than a response has terms; nothing is transient
+            inside = self.lines[np.abs(self.lines - centre) <= half]
+            nearest = np.sort(self.lines[np.argsort(np.abs(self.lines - centre))[:least]])
+            return inside if len(inside) > least else nearest
+        first = max(min(round(centre) - half, len(self.instrument) - 1 - 2 * half), 1)
+        return np.arange(first, min(first + 2 * half + 1, len(self.instrument)))
+
     def about(self, frequency: float, width: float) -> _Local:
         """The responses about a frequency, by least squares over what is as near as ``width``."""
         centre = frequency * self.cells * self.period
-        half = max(round(width * centre), UNKNOWNS)
-        first = max(min(round(centre) - half, len(self.instrument) - 1 - 2 * half), 1)
-        at = np.arange(first, min(first + 2 * half + 1, len(self.instrument)))
+        at = self._near(centre, width)
         size = np.abs(self.instrument[at])
         # times its surroundings, above which a line, of a slow motion, is left out: what friction
         # makes of it would decide there
         loudest = 10.0
         at = at[size <= loudest * np.median(size)]
-        powers = (((at - centre) / half)[:, None] ** POWERS).astype(complex)
-        columns = np.hstack([self.instrument[at, None] * powers, powers])
+        powers = ((at - centre) / max(np.ptp(at) / 2.0, 1.0))[:, None].astype(complex) ** POWERS
+        transient = powers[:, :0] if self.is_sparse else powers
+        columns = np.hstack([self.instrument[at, None] * powers, transient])
         size = np.linalg.norm(columns, axis=0)
         size[size == 0.0] = 1.0
         unit = (columns / size).conj().T
@@ -187,8 +217,12 @@ class _Spectra:
         rows = self.signals[at]
         found = inverse @ rows
         left = rows - columns @ found
-        freedom = max(len(at) - UNKNOWNS, 1)
+        freedom = max(len(at) - columns.shape[1], 1)
         weights = inverse[0]
+        if self.is_sparse:  # the line itself: between distant ones no polynomial is a response
+            here = int(np.abs(at - centre).argmin())
+            weights = np.zeros(len(at), dtype=complex)
+            weights[here] = 1.0 / self.instrument[at[here]]
         covariance = left.T @ left.conj() / freedom * np.sum(np.abs(weights) ** 2)
         noise = np.full((2, 2), np.nan, dtype=complex)
         if self.noise is not None:
@@ -196,13 +230,14 @@ class _Spectra:
         moved = rows - columns[:, len(POWERS) :] @ found[len(POWERS) :]
         whole = np.maximum(np.sum(np.abs(moved) ** 2, axis=0), np.finfo(float).tiny)
         explained = 1.0 - np.sum(np.abs(left) ** 2, axis=0) / whole
-        return _Local(found[0], covariance, noise, np.clip(explained, 0.0, 1.0), freedom)
+        return _Local(weights @ rows, covariance, noise, np.clip(explained, 0.0, 1.0), freedom)
 
 
-def _repeats_after(signal: Array) -> int:
-    """Samples after which a signal (n,) without noise repeats; n where it does not.
+def _repeats_after(signal: Array, setpoint: Array) -> int:
+    """Samples after which a setpoint without noise repeats; n where it does not.
 
-    In its first and its last period it may begin and end.
+    In its first and its last period it may begin and end. signal (n,): its second difference, in
+    which what is fast shows, and slow motion does not.
     """
     n = len(signal)
     alike = np.fft.irfft(np.abs(np.fft.rfft(signal, fast_length(2 * n))) ** 2)[: n // 3]
@@ -210,9 +245,9 @@ def _repeats_after(signal: Array) -> int:
     # 0.3 of the whole: of three periods a repeat overlaps by two thirds, less its ends
     tops = np.flatnonzero((inner >= alike[:-2]) & (inner >= alike[2:]) & (inner > 0.3 * alike[0]))
     for cells in tops + 1:
-        middle = signal[cells:-cells]
+        inside = [whole[cells:-cells] for whole in (signal, setpoint)]
         # 1e-3 of the setpoint, by which a text of a few digits rounds it
-        if np.abs(middle[cells:] - middle[:-cells]).max() < 1e-3 * np.ptp(middle):
+        if all(np.abs(w[cells:] - w[:-cells]).max() < 1e-3 * np.ptp(w) for w in inside):
             return int(cells)
     return n
 

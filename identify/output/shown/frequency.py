@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_NO_SETPOINT = (
+    "none logged, so that the loop is taken as open: what noise makes of the force in a closed "
+    "one counts as response; log the setpoint"
+)
 MORE = "a multisine excites more, as `twin simulate multisine --model MODEL` runs"
 
 
@@ -65,7 +69,11 @@ def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
     facts = [("frequencies", f"{part}, {number(low)} to {number(high)} Hz")]
     if np.isfinite(found.noise).any():
         share = float(np.nanmedian((found.distortion / found.spread)[kept] ** 2))
-        facts.append(("neither noise nor linear", f"{percent(share)} of its variance (median)"))
+        wide = float(np.median(found.spread[kept] / np.abs(found.plant[kept])))
+        facts.append(("spread", f"{percent(wide)} of the response, of whose variance "
+                      f"{percent(share)} repeats and so is no noise (medians)"))  # fmt: skip
+    if not np.isfinite(found.closed).any():
+        facts.append(("setpoint", _NO_SETPOINT))
     if axis.bias is not None:
         return facts
     if shown.plant is None:
@@ -75,7 +83,8 @@ def read_off(shown: Shown, axis: AxisFrequency) -> list[tuple[str, str]]:
 
 
 def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str]]:
-    facts = [(units.mass_name, _with_band(plant.mass, units.mass))]
+    told = math.isfinite(plant.mass.band)
+    facts = [(units.mass_name, _with_band(plant.mass, units.mass) if told else "not told")]
     if _is_there(plant.damping):
         facts.append(("viscous damping", _with_band(plant.damping, units("N s/m"))))
     if _is_there(plant.stiffness):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import nan, pi
+from math import inf, nan, pi
 
 import numpy as np
 import pytest
@@ -42,7 +42,9 @@ def told(shown: Shown, axis: AxisFrequency = AXIS) -> dict[str, str]:
 def test_what_is_read_off_is_told_with_its_band() -> None:
     assert told(SHOWN) == {
         "frequencies": "3 of 5 usable, 2.50 to 17.3 Hz",
-        "neither noise nor linear": "36 % of its variance (median)",
+        "spread": (
+            "50 % of the response, of whose variance 36 % repeats and so is no noise (medians)"
+        ),
         "mass": "3.100 ± 0.020 kg",
         "viscous damping": "4.20 ± 0.30 N·s/m",
         "stiffness": "510 ± 11 N/m",
@@ -107,10 +109,14 @@ def test_what_does_not_tell_is_said_to() -> None:
     assert few["mass"].startswith("too few frequencies to read it off")
     assert "delay" not in few
     unknown = told(replace(SHOWN, response=replace(RESPONSE, noise=nan * ONES)))
-    assert "neither noise nor linear" not in unknown
+    assert "spread" not in unknown
+    without = told(replace(SHOWN, response=replace(RESPONSE, closed=nan * ONES)))
+    assert "what noise makes of the force in a closed one counts" in without["setpoint"]
+    endless = replace(PLANT, mass=Banded(3.1, inf))
+    assert told(replace(SHOWN, plant=endless))["mass"] == "not told"
     assert told(SHOWN, replace(AXIS, bias=Bias(3.0, None))).keys() == {
         "frequencies",
-        "neither noise nor linear",
+        "spread",
     }
 
 
