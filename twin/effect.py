@@ -22,6 +22,7 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -391,7 +392,8 @@ def load_effect(path: Path) -> Effect:
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     try:
-        spec.loader.exec_module(module)
+        with redirect_stdout(sys.stderr):  # what it prints is no answer
+            spec.loader.exec_module(module)
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         if isinstance(error, TypeError) and "Parameter" in reason:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from identify.dataset.dataset import Dataset
 from identify.dataset.preparation import is_informative, require_informative, telling
 from identify.dataset.prepared_log import sticks
+from identify.estimation.force_balance import require_residual
 from twin.core.walks import CHANNEL_ROW
 from twin.effect import Effect
 from twin.effects import Catalogue
-from twin.errors import InputError
+from twin.errors import InputError, at
 from twin.logs import LINEAR_UNITS
 from twin.model.machine import AxisModel, Fitted, Hindrance, MachineModel
 from twin.model.parameters import free_parameters
@@ -64,6 +65,9 @@ def require_shown(effect: Effect, axes: Mapping[str, tuple[AxisModel, Dataset]])
     asked = {n: (axes[n][1], sticks(axis), fitted_count(axis)) for n, axis in own.items()}
     if not (shown := [n for n, each in asked.items() if is_informative(*each)]):
         require_informative(*next(iter(asked.values())))
+    for name in shown:
+        with at(f"with {effect.name}"):
+            require_residual(own[name], axes[name][1])
     return shown
 
 

@@ -21,7 +21,7 @@ from identify.results.fleet import Alarm, Scope
 from identify.validation.agreement import agreement
 from identify.validation.tracking import unmoved
 from identify.view.replay import replay
-from twin.effects import Catalogue
+from twin.effects import Catalogue, load_catalogue
 from twin.errors import InputError
 from twin.logs import AxisLog, Log
 from twin.model.machine import AxisIntervals, AxisModel, Fitted, Hardware, MachineModel
@@ -162,3 +162,19 @@ def test_a_log_in_which_no_axis_of_the_model_moves_says_which_there_are() -> Non
 
 def test_within_its_limits_nothing_is_said() -> None:
     require_within_limits(ONE, LOG)
+
+
+def test_an_effect_whose_force_is_no_number_somewhere_is_refused_as_it_is_added(tmp_path) -> None:
+    """The root of a negative number beyond 25 mm, in which no trial as it is loaded comes."""
+    (tmp_path / "rooted.py").write_text(
+        "from math import sqrt\n"
+        "from twin.effect import OUT, Effect, Kind, Parameter, X\n"
+        "def law(p, s, io):\n"
+        "    io[OUT] = -p[0] * sqrt(0.025 * 0.025 - io[X] * io[X])\n"
+        'K = Parameter("k", "N/m", 0.0, 0.0, 1e6, "stiffness", strength=True)\n'
+        'EFFECT = Effect(kind=Kind.FORCE, summary="a", equation="b", source="c", parameters=(K,),\n'
+        '                law=law, fingerprint="d", excited_by="e")\n'
+    )
+    known = load_catalogue(tmp_path / "rooted.py")
+    with pytest.raises(InputError, match=r"with rooted: .* is not a finite number in"):
+        identify.add("rooted", ONE, LOG, catalogue=known)

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import twin.effect as slots
 from twin.core.compiled import law_address
 from twin.effect import (
     ACC,
+    CHANNELS,
     DRY,
     DT,
     HOLD,
@@ -42,6 +45,11 @@ RESULT = {
     Kind.FRICTION: "io[OUT]",
     Kind.STRUCTURE: "io[OUT]",
 }
+# The slots by which a log is asked for what they hold.
+_SLOTS = {
+    vars(slots)[name]: name for name in ("TIME", "U", "X_OTHER", "V_OTHER", "A_OTHER", *CHANNELS)
+}
+_SI = frozenset(("N", "m", "s", "kg", "K", "Pa", "A", "V", "Hz", "J", "W", "rad"))
 SPEEDS = (0.0, 0.1, 1e-6, -1e-6, -0.1, 0.0)  # m/s, one sample each
 PERIOD = 1e-4  # s
 
@@ -55,7 +63,7 @@ class Guarded(list):
 
     def __init__(self, name: str, values: list[float]) -> None:
         super().__init__(values)
-        self.name = name
+        self.name, self.used = name, set[int]()
 
     def __getitem__(self, index):
         return super().__getitem__(self._inside(index))
@@ -66,6 +74,7 @@ class Guarded(list):
     def _inside(self, index):
         if not 0 <= index < len(self):
             raise Outside(f"{self.name}[{index}]")
+        self.used.add(index)
         return index
 
 
@@ -75,6 +84,9 @@ def require_sound(effect: Effect, path: Path) -> None:
     At usual speeds it must give a finite number and some result; over a wide range of motion its
     indices must stay within their arrays.
     """
+    require_units(effect, path)
+    if effect.reads("print"):
+        raise InputError(f"{path}: its law prints, at every sample; take that out")
     # The start value, or a small strength where the effect is absent at the start.
     values = [
         p.start if p.start or not p.strength else min(max(0.1, p.lower), p.upper)
@@ -105,12 +117,36 @@ def require_sound(effect: Effect, path: Path) -> None:
                 "math functions and the arrays p, s, io"
             ) from error
         acted = acted or sample != list(io)
+        require_named(effect, path, io.used)
     if not acted:
         raise InputError(
             f"{path}: its law writes no result; a {effect.kind.name.lower()} effect writes "
             f"{RESULT[effect.kind]}"
         )
     law_address(effect)
+
+
+def require_units(effect: Effect, path: Path) -> None:
+    """Raise InputError for a unit by which no value is in SI: it would be told beside it."""
+    for p in effect.parameters:
+        if unknown := [u for u in re.findall(r"[^\W\d_]+|%|°", p.unit) if u not in _SI]:
+            raise InputError(
+                f"{path}: the unit of {p.name} is '{p.unit}', with '{unknown[0]}', which is not "
+                "of SI; give the value in N, m, s, kg, K, Pa, A, V; '1' for a ratio"
+            )
+
+
+def require_named(effect: Effect, path: Path, used: Iterable[int]) -> None:
+    """Raise InputError where the law uses a slot of io by another name than that of twin.effect.
+
+    By these it is known what an effect needs of a log: the other axis, pressure, the time.
+    """
+    for name in (_SLOTS[k] for k in used if k in _SLOTS):
+        if not effect.reads(name):
+            raise InputError(
+                f"{path}: its law uses io[{vars(slots)[name]}] by another name; write io[{name}], "
+                f"with `from twin.effect import {name}`"
+            )
 
 
 def _at_speed(speed: float) -> list[float]:

@@ -173,7 +173,7 @@ def _in_parts(columns: Mapping[str, Array]) -> Iterator[Times]:
     """Times of which a column has the whole seconds and another, called alike, what is left."""
     for name, whole in columns.items():
         stem, unit = _stem(name)
-        if _SIZES.get(unit) != 1.0 or (whole != np.rint(whole)).any() or not whole.any():
+        if _SIZES.get(unit or "") != 1.0 or (whole != np.rint(whole)).any() or not whole.any():
             continue
         for other, column in columns.items():
             beside, finer = _stem(other)

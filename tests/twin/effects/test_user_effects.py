@@ -37,6 +37,12 @@ MISTAKES = {
     "crash": ("EFFECT = ", "import ctypes\nctypes.string_at(0)\nEFFECT = ", "crashed .*SIGSEGV"),
     "loop in the law": (LAW_END, f"while io[V] > 0.05:\n        pass\n    {LAW_END}", "a loop"),
     "hunger": ("EFFECT = ", "bytearray(1 << 33)\nEFFECT = ", "as an effect: MemoryError"),
+    "unit of no SI": (STRENGTH, STRENGTH.replace("N/m", "N/mm"), "unit of k is 'N/mm', with 'mm'"),
+    "another name of a slot": (LAW_END, f"{LAW_END} + 0.0 * io[OTHER]",
+        "uses io[7] by another name; write io[X_OTHER]"),
+    "a number for a slot": (LAW_END, f"{LAW_END} + 0.0 * io[86]",
+        "uses io[86] by another name; write io[PRESSURE]"),
+    "prints": (LAW_END, f"{LAW_END}\n    print(io[X])", "its law prints, at every sample"),
     "unknown name": (LAW_END, "io[OUT] = missing", "name 'missing' is not defined"),
 }  # fmt: skip
 
@@ -52,7 +58,7 @@ def test_a_mistake_is_said_in_one_line(fault: str, tmp_path: Path) -> None:
     text = SOURCE.read_text(encoding="utf-8")
     assert good in text
     text = text.replace(good, bad).replace("import exp", "import exp, sqrt")
-    text = text.replace("OUT, Effect", "OUT, V, Effect")
+    text = text.replace("OUT, Effect", "OUT, V, X_OTHER as OTHER, Effect")
     if fault == "one state too few":
         text = text.replace(LAW_END, f"s[1] = distance\n    {LAW_END}")
     path = tmp_path / "bad.py"
