@@ -11,6 +11,7 @@ from identify.dataset.dataset import Role
 from identify.dataset.motion import SHORTEST_LOG, other_axes, shortest_log
 from twin.checks import moves
 from twin.checks.copies import copies
+from twin.effect import MOST
 from twin.errors import InputError
 from twin.logs import LINEAR_UNITS, Log
 from twin.model.machine import AxisModel
@@ -187,4 +188,9 @@ def _require_numbers(name: str, log: Log, axis: str, signal: str, values: Array)
         raise InputError(
             f"{name}: {signal} of axis {axis} is not a finite number in {len(bad)} of {len(log)} "
             f"samples, from {bad[0] * log.period:.6g} s; cut the log there, or give another"
+        )
+    if (most := float(np.abs(values).max(initial=0.0))) > MOST:
+        raise InputError(
+            f"{name}: {signal} of axis {axis} reaches {most:.3g}, as of no machine; did a "
+            "simulation diverge? give another log"
         )

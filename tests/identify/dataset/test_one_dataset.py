@@ -187,6 +187,9 @@ def test_what_is_not_a_number_is_refused_in_one_line():
         told = one_line(fit, STAGE, {"log": holed})
         assert told.startswith(f"log: {signal} of axis x is not a finite number in 1 of 4000")
         assert "from 0.35 s; cut the log there" in told
+    told = one_line(fit, STAGE, {"log": changed(run, position=lambda v: 1e120 * v)})
+    assert "position of axis x reaches" in told
+    assert "did a simulation diverge?" in told
     beside = AxisLog({"position": np.append(T[1:], np.nan), "force": T})
     both = replace(run, axes={**run.axes, "z": beside})
     told = one_line(fit, STAGE, {"log": both})  # whose motion x may depend on
