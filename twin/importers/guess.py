@@ -35,6 +35,7 @@ from twin.importers.proposal.text import (
     needs_of,
     why_not,
 )
+from twin.importers.proposal.units import position_unit
 from twin.importers.stated_time_base import find_time_base
 from twin.importers.table import SignalTable, numbers
 from twin.importers.units import find_unit, is_unit
@@ -132,8 +133,9 @@ class Proposal:
             why = "of no axis by its name" if axis is None else why_not(self.file, axis, column)
             return ColumnRow(column, unit, False, low, high, values.short, why)
         signal, assumed = entry.signal, any(need.assumed for need in entry.needs)
+        shown = position_unit(self.file, axis)[0] if signal.name.is_integral else entry.unit
         return ColumnRow(
-            column, entry.unit, assumed, low, high, values.short, ", ".join(signal.reasons),
+            column, shown, assumed, low, high, values.short, ", ".join(signal.reasons),
             axis.name, signal.field, signal.certainty.value,
         )  # fmt: skip
 
@@ -157,13 +159,14 @@ def propose(path: Path) -> Proposal:
         clock = f"resample = {one.rate:g} # Hz, because each column has rows of its own"
         stated = replace(stated, lines=(*stated.lines, clock))
     moving = {n: c for n, c in columns.items() if n not in stated.used and np.ptp(c) > 0.0}
-    known, made = not stated.missing, made_positions(moving)
+    known, made = not stated.missing, made_positions(moving, stated.step)
     moving |= {m.name.column: m.values for m in made}
-    moving = {n: c for n, c in moving.items() if n not in {m.error for m in made}}
+    errors = {m.error for m in made if m.error is not None}
+    moving = {n: c for n, c in moving.items() if n not in errors}
     names = names_of([*moving]) | {m.name.column: m.name for m in made}
     file = File(names, columns_of(moving), stated.step if known else None)
     axes = tuple(_axis(file, a, names) for a, names in axes_of(file.names, file.columns).items())
-    used = {*stated.used, *(c for axis in axes for c in axis.columns), *(m.error for m in made)}
+    used = {*stated.used, *(c for axis in axes for c in axis.columns), *errors}
     taken = {*stated.used, *(s.column for axis in axes for s in axis.signals.values())}
     left = {n: c for n, c in table.columns.items() if n not in used}
     others = [_about(n, c) + ", of no axis by its name" * (n in moving) for n, c in left.items()]

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from twin.errors import InputError, at
 from twin.importers.counters import find_wraps, unwrapped
@@ -310,6 +311,8 @@ def _log(mapping: ImportMap, columns: Columns, rate: float, facts: Mapping[str, 
         for field, c in axis.columns.items():
             rows = slice(span.start + c.delay_samples, span.stop + c.delay_samples)
             signals[field] = c.to_si(columns[c.key][rows])
+            if c.integrated:
+                signals[field] = cumulative_trapezoid(signals[field], dx=1.0 / rate, initial=0.0)
             if axis.side_of(field) == "load":  # what at_joints brings to the load is the motor's
                 (ratio,) = axis.ratios(name).values()
                 signals[field] = signals[field] * (1.0 / ratio if field in HELD else ratio)

@@ -104,6 +104,8 @@ class ColumnMap(_Column):
     """another column in its unit, which is taken off it: of a set point the following error"""
     plus: str | int | None = None
     """another column in its unit, which is added: an error that is position less set point"""
+    integrated: bool = False
+    """true: it is a velocity, whose integral from 0 on is the position"""
     unit: str = Field(description='a unit in quotes, such as "mm", "A", "V" or "counts"')
     scale: float | str = 1.0
     """a finite number other than 0: SI units a raw one; or a scalar of the file"""
@@ -157,7 +159,7 @@ class ColumnMap(_Column):
     def require_unit(self, field: str) -> None:
         """Find the unit, of a signal of that name; raises InputError where there is none."""
         either = dict.fromkeys((LINEAR_UNITS[field], ROTARY_UNITS[field]))
-        self._si = find_unit(self.unit, *either)
+        self._si = self._of_a_rate(field) if self.integrated else find_unit(self.unit, *either)
         counted = self._per_count(field)
         if counted is not None:
             self._si = counted
@@ -173,6 +175,17 @@ class ColumnMap(_Column):
                 f"scale = '{self.scale}': give a finite number without quotes, or the name of a "
                 "scalar of the file"
             )
+
+    def _of_a_rate(self, field: str) -> Unit:
+        """The unit of a position that is a velocity's integral; raises InputError."""
+        if not field.endswith("position"):
+            raise InputError(f"integrated: of a velocity a position is made, no {field}")
+        rate = field.replace("position", "velocity")
+        found = find_unit(self.unit, LINEAR_UNITS[rate], ROTARY_UNITS[rate])
+        if found.si is None:
+            raise InputError(f"unit '{self.unit}': to be integrated it must be one of a velocity")
+        linear = found.si == LINEAR_UNITS[rate]
+        return Unit(found.size, (LINEAR_UNITS if linear else ROTARY_UNITS)[field])
 
     @property
     def is_counted(self) -> bool:

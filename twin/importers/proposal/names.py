@@ -59,7 +59,8 @@ class Name:
     quantity, role: None where it says none. sure: whether a word says the quantity, not only a
     letter, a role or a unit. unit: as the import map knows it. axis: what tells this axis from
     another. smoothed: whether it was filtered. parts: of a position that two columns make the
-    first, "less" or "plus", and the second.
+    first, "less" or "plus", and the second; of one that is an integral its rate, "integrated", and
+    None.
     """
 
     column: str
@@ -69,7 +70,12 @@ class Name:
     axis: tuple[str, ...]
     sure: bool
     smoothed: bool
-    parts: tuple[str, str, str] | None = None
+    parts: tuple[str, str, str | None] | None = None
+
+    @property
+    def is_integral(self) -> bool:
+        """Whether it is a position made of a velocity."""
+        return self.parts is not None and self.parts[2] is None
 
 
 @cache

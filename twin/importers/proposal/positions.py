@@ -36,7 +36,10 @@ def _of_those_called(file: File, axis: ProposedAxis, names: Sequence[Name]) -> S
     """The measured one, else the one whose motion makes a force, else the one that follows."""
     alike = [n for n in names if _rank(n) == max(map(_rank, names))]
     if len(alike) == 1:
-        return Signal("position", alike[0], Certainty.LIKELY, ("so called",))
+        why = "so called"
+        if alike[0].is_integral:
+            why = "of a velocity, as no position is recorded"
+        return Signal("position", alike[0], Certainty.LIKELY, (why,))
     forces = [n for n in file.some(axis.free, *DRIVING) if is_drive(n)]
     best, most = alike[0], 0.0
     for name in alike:

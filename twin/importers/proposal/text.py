@@ -82,7 +82,8 @@ class MapEntry:
         """As it stands in the map."""
         values = {"column": _quoted(self.signal.column)}
         if (parts := self.signal.name.parts) is not None:
-            values = {"column": _quoted(parts[0]), parts[1]: _quoted(parts[2])}
+            more = "true" if parts[2] is None else _quoted(parts[2])
+            values = {"column": _quoted(parts[0]), parts[1]: more}
         values["unit"] = _quoted(self.unit)
         if self.size is not None:
             entry, value = self.size
@@ -94,6 +95,7 @@ class MapEntry:
         table = ", ".join(f"{key} = {value}" for key, value in values.items())
         why = ", ".join(self.signal.reasons)
         span = f"{column.values.min():.4g} to {column.values.max():.4g}"
+        span += " in SI" if self.signal.name.is_integral else ""
         jumps = () if column.wraps is None else (f"jumps back by {column.wraps:.6g}: it wraps",)
         assumed = (f"{self.signal.assumed} ASSUMED",) if self.signal.assumed else ()
         sure = f"{self.signal.certainty.value}: {why}"
@@ -142,6 +144,10 @@ def _of_channel(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
 
 
 def _of_position(file: File, axis: ProposedAxis, signal: Signal) -> MapEntry:
+    if (parts := signal.name.parts) and signal.name.is_integral:
+        known = file.names[parts[0]].unit
+        unit = known or ("rad/s" if turns(axis) else "m/s")
+        return MapEntry(signal, unit) if known else _assumed(axis, signal, unit)
     unit, stated = position_unit(file, axis)
     if is_raw(unit):
         how = _by_velocity(file, axis, signal, unit)

@@ -64,6 +64,8 @@ def position_unit(file: File, axis: ProposedAxis) -> tuple[str, bool]:
     position = axis.signals["position"]
     if position.name.unit is not None:
         return position.name.unit, True
+    if (parts := position.name.parts) and position.name.is_integral:  # in SI
+        return ("rad" if turns(axis) else "m"), file.names[parts[0]].unit is not None
     column = file.column(position.name)
     if (unit := customary(position.name)) or (unit := _ROUND.get(column.wraps or 0.0)):
         return unit, False
