@@ -490,3 +490,15 @@ def test_only_a_velocity_is_integrated_to_a_position(tmp_path, field, unit, mess
     lines = "\n".join(f"{name} = {entry}" for name, entry in entries.items())
     with pytest.raises(InputError, match=message):
         parse_mapping(f"sample_rate = 1000\n[axes.x]\n{lines}\n")
+
+
+def test_parts_of_a_command_are_no_force(tmp_path):
+    path = tmp_path / "a.csv"
+    write_csv(path, {"t": T, "q": Q, "tau_ff": 0.9 * F, "tau_pid": 0.1 * F + 1e-2 * NOISE})
+    found = guess_map(path)
+    assert list(columns_of(found.text)) == ["x"]
+    assert list(columns_of(found.text)["x"]) == ["position"]
+    assert "not used: tau_ff, tau_pid: a part of the command, by its name" in found.text
+    assert any("looks like a force" in lack for lack in found.missing)
+    write_csv(path, {"t": T, "q": Q, "PID torque": F})  # which may be all there is
+    assert "that it is all of the force ASSUMED" in guess_map(path).text

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from twin.importers.proposal.axes import DRIVING
 from twin.importers.proposal.courses import distinct, follows, same, sign_of, sums
-from twin.importers.proposal.lexicon import Quantity, SignalRole
+from twin.importers.proposal.lexicon import AHEAD, Quantity, SignalRole
 from twin.importers.proposal.motion import Explained
-from twin.importers.proposal.names import Name
+from twin.importers.proposal.names import Name, words_of
 from twin.importers.proposal.positions import TOLD
 from twin.importers.proposal.signals import Certainty, File, ProposedAxis, Signal
 from twin.importers.units import is_unit
@@ -69,7 +69,10 @@ def _drives_called(file: File, axis: ProposedAxis) -> tuple[ProposedAxis, list[N
         parts = {**{n: w for n, w in parts.items() if n != total.name},
                  **{c.name: why for c in others}}  # fmt: skip
     whole = [n for n in called if n.column not in parts]
-    return (axis.without(parts), whole) if whole else (axis, called)
+    # A part may be all there is of a command, but where something is fed forward beside it.
+    if not whole and not any(AHEAD & set(words_of(n.column)) for n in called):
+        return axis, called
+    return axis.without(parts), whole
 
 
 # --- forces that names tell -----------------------------------------------------------------------
@@ -148,7 +151,10 @@ def _taken(file: File, axis: ProposedAxis, field: str, one: ForceCandidate) -> P
         sure, why = Certainty.SURE, f"so called, the motion explains {one.share} of it"
     else:
         sure, why = Certainty.UNSURE, f"so called, but the motion explains {one.share} of it only"
-    return _with_sign(file, axis, Signal(field, one.name, sure, (why,)), one.motion)
+    signal = Signal(field, one.name, sure, (why,))
+    if one.name.role is SignalRole.PART:
+        signal = replace(signal, certainty=Certainty.UNSURE, assumed="that it is all of the force")
+    return _with_sign(file, axis, signal, one.motion)
 
 
 def _with_sign(file: File, axis: ProposedAxis, signal: Signal, motion: Explained) -> ProposedAxis:

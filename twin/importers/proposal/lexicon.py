@@ -54,6 +54,7 @@ HINTS: Mapping[Quantity, str] = _by(Quantity, _FILE["hints"])
 ROLES: Mapping[SignalRole, str] = _by(SignalRole, _FILE["roles"])
 SMOOTHED, EMPTY, TURNING = _words("smoothed"), _words("empty"), _words("turning")
 COUNTING, RAW, ERRORS = _words("counting"), _words("raw"), _words("errors")
+AHEAD = _words("ahead")
 RATES: Mapping[str, Mapping[Quantity, Quantity]] = {
     word: {quantity: Quantity[rate.upper()] for quantity, rate in _by(Quantity, rates).items()}
     for word, rates in _FILE["rates"].items()
