@@ -58,7 +58,7 @@ def toml_document(path: Path) -> tuple[str, dict[str, Any]]:
     if len(content) > most_bytes:
         raise InputError(f"is larger than {most_bytes // 10**6} MB; give a TOML file")
     try:
-        text = content.decode()
+        text = content.decode("utf-8-sig")  # editors of Windows begin with a mark
         return text, tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number of 5000 digits, 5000 nested lists
         raise InputError(f"is not a TOML file: {error}") from error

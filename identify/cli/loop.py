@@ -434,7 +434,9 @@ def plan(
     with engine(scheduler) as workers:
         done = with_logs(partial(job, over=partial(in_order, *workers)), machine, logs, holdout)
     if not done.result.decides:
-        return said_of(done.result, done.warnings, fine=False)
+        said = said_of(done.result, done.warnings, fine=False)
+        earlier = f"; {out} is of an earlier plan" if out.exists() else ""
+        return replace(said, text=f"{said.text}\nnothing is written{earlier}")
     chosen, table = done.result.chosen, out.with_suffix(ENDING)
     said = said_of(done.result, done.warnings, file=out, setpoints=table)
     head = said.text.splitlines()[:3]

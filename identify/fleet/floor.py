@@ -78,7 +78,7 @@ class FloorPlan:
     @classmethod
     def of(cls, path: Path = FLOOR) -> FloorPlan:
         """That of a file."""
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        given = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         return cls(
             datetime.fromisoformat(given["first_night"]), given["duration"], given["hall"],
             {name: Scatter(**own) for name, own in given["parameters"].items()},

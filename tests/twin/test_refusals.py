@@ -57,6 +57,7 @@ MM, MIXED = {"position": "mm"}, {"position": "m", "force": "N m"}
         (lambda: holding(velocity=np.zeros(3)), "the columns differ in length (position 4, force"),
         (lambda: holding(velocity=np.array(["1"] * 4)), "velocity is no column of numbers (['1'"),
         (lambda: holding(velocity=np.zeros((4, 1))), "velocity is no column of numbers"),
+        (lambda: holding(velocity=np.zeros(4) + 1j), "velocity is no column of numbers"),
         (lambda: holding(velocity=[1.0, None, [2.0], 3.0]), "velocity is no column of numbers"),
         (lambda: replace(ONE, units=MM), "unit of position is 'mm', allowed is m or rad"),
         (lambda: replace(ONE, units=MIXED), "force in N m, position in m: units of a rotary"),

@@ -113,7 +113,7 @@ def _column(name: str, given: ArrayLike) -> Array:
     """Samples (n,) as numbers, of an array, a list or a column of another library."""
     try:
         column = np.asarray(given)
-        column = column if column.dtype.kind in "USMm" else column.astype(float, copy=False)
+        column = column if column.dtype.kind in "USMmc" else column.astype(float, copy=False)
     except (TypeError, ValueError):
         column = np.empty((0, 0))
     if column.ndim != 1 or column.dtype != np.float64:

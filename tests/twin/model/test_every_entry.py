@@ -146,6 +146,12 @@ def test_a_log_in_the_place_of_a_model_is_said_to_be_one(tmp_path: Path) -> None
         load_model(tmp_path / "run.mcap", CATALOGUE)
 
 
+def test_the_mark_that_editors_of_windows_begin_with_is_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + b'name = "m"\nsample_rate = 1000.0\n[axes.x]\nmass = 2.0\n')
+    assert load_model(path, CATALOGUE).axes["x"].mass == 2.0
+
+
 @pytest.mark.parametrize(
     "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a = 1\na = 2", "\x00", "[axes.x"]
 )
