@@ -16,12 +16,14 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
+from twin.importers.nested import recordings_of
 from twin.importers.own_rows import on_one_clock
 from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
 from twin.importers.proposal.following import made_positions
 from twin.importers.proposal.forces import exchanged, with_force
+from twin.importers.proposal.lexicon import Quantity
 from twin.importers.proposal.names import names_of, unit_of
 from twin.importers.proposal.positions import with_position, with_rates, with_setpoints
 from twin.importers.proposal.signals import File, ProposedAxis
@@ -144,6 +146,7 @@ def propose(path: Path) -> Proposal:
     """What is proposed for a file of any of the formats; raises InputError without a column."""
     with reading(path):
         table = table_of(path, EVERY_COLUMN)
+        _require_one_recording(table)
         one = on_one_clock(table)
         table = table if one is None else one.table
         columns, holes = _distinct(table)
@@ -173,10 +176,34 @@ def propose(path: Path) -> Proposal:
     head = f"# Proposed from {path.name}; correct what is wrong, above all what is ASSUMED"
     tail = ("", *(f"# not used: {other}" for other in others)) if others else ()
     missing = {n: hole for n, hole in holes.items() if n in taken}
-    lines, words = (head, *stated.lines), tuple(_in_words(table.columns))
+    usual = max((len(c) for c in columns.values()), default=0)
+    words = (*_in_words(table.columns), *_other_lengths(table, usual))
+    lines = (head, *stated.lines)
     return Proposal(
         path.name, file, axes, lines, tail, missing, stated.missing, words, stated.asking
     )
+
+
+def _require_one_recording(table: SignalTable) -> None:
+    """Raise InputError where a file holds several, which are no axes of one machine."""
+    if found := recordings_of(table.columns):
+        some = next(name for name in table.columns if name.startswith(found[0]))
+        raise InputError(
+            f"holds {len(found)} recordings: {', '.join(found)}; give each as a file of its own, "
+            f"or name the columns of one in a map, such as '{some}'"
+        )
+
+
+def _other_lengths(table: SignalTable, usual: int) -> Iterator[str]:
+    """Of columns that are called as signals and have other rows than the usual ones, what to do."""
+    lengths = {n: len(c) for n, c in table.columns.items() if len(c) not in (1, usual)}
+    signals = (Quantity.POSITION, Quantity.FORCE, Quantity.CURRENT)
+    for name, said in names_of([*lengths]).items():
+        if said.quantity in signals:
+            yield (
+                f"'{name}' has {lengths[name]} rows, the others {usual}: give the file twice, with "
+                "a table [[files]] and its time for each"
+            )
 
 
 def _axis(file: File, name: str, columns: Sequence[str]) -> ProposedAxis:
@@ -237,8 +264,9 @@ def _distinct(table: SignalTable) -> tuple[dict[str, Array], dict[str, str]]:
                 holes[name] = hole
                 column = np.interp(np.arange(len(column)), finite, column[finite])
             out[name] = column
-    longest = max((len(c) for c in out.values()), default=0)
-    return {name: column for name, column in out.items() if len(column) == longest}, holes
+    lengths = [len(c) for c in out.values()]  # that of the most columns is the recording's
+    usual = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
+    return {name: column for name, column in out.items() if len(column) == usual}, holes
 
 
 def doubts_of(mapping: ImportMap) -> Iterator[str]:

@@ -26,7 +26,7 @@ from twin.importers.mapping import ImportMap, load_mapping
 from twin.importers.own_rows import bridged
 from twin.importers.stamps import with_times
 from twin.importers.stated_rate import StatedRate, stated_rate
-from twin.importers.table import SignalTable, numbers
+from twin.importers.table import SignalTable, as_numbers, numbers
 from twin.importers.time_base import (
     TimeBase,
     even_times,
@@ -226,7 +226,8 @@ def table_of(path: Path, mapping: ImportMap) -> SignalTable:
 
 def _table(path: Path, mapping: ImportMap, dialect: str) -> SignalTable:
     table = all_dialects()[dialect].read(path, mapping)
-    table = replace(table, columns=with_times(table.columns))
+    columns = {n: as_numbers(c) for n, c in with_times(table.columns).items()}
+    table = replace(table, columns=columns)
     return table.part(*mapping.rows) if mapping.rows else table
 
 

@@ -18,6 +18,8 @@ from twin.importers.stamps import is_stamp
 from twin.importers.table import split_columns
 
 ROWS = "data"  # what the rows of a bare list are called
+# of several tables with the same columns these are recordings, and no axes
+_RUN = re.compile(r"(?i)(?:run|test|trial|rec|recording|meas|measurement|messung)[\W_]?\d+\W?$")
 
 
 def flat(content: Mapping[str, Any]) -> dict[str, NDArray]:
@@ -33,7 +35,14 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
     for key, value in content.items():
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
-            columns |= _flat(f"{name}.", value, names)
+            numbered = len(value) > 1 and [*value] == [*map(str, range(len(value)))]
+            if numbered and not any(isinstance(v, Mapping | list) for v in value.values()):
+                columns |= _flat(prefix, {key: [*value.values()]}, names)  # as pandas writes them
+            else:
+                columns |= _flat(f"{name}.", value, names)
+        elif _are_all(dict, value) and (batches := _batches(value)):
+            above = f"{name}." if prefix else ""
+            columns |= {f"{above}{k}": column for k, column in batches.items()}
         elif _are_messages(value):
             rows = [dict(_leaves("", row)) for row in value]
             for k in dict.fromkeys(k for row in rows[:1] + rows[-1:] for k in row):
@@ -42,7 +51,7 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
                 )
         elif _is_of_rows(value):
             above = f"{name}." if prefix or sum(map(_is_of_rows, content.values())) > 1 else ""
-            for k in value[0]:
+            for k in dict.fromkeys(k for row in value for k in row):
                 columns[f"{above}{k}"] = np.array([row.get(k, np.nan) for row in value])
         elif _are_all(dict, value):
             for inner, table in _named_tables(name, value):
@@ -78,6 +87,26 @@ def _are_messages(value: Any) -> bool:
     if not _are_all(dict, value) or len(value) < many or _is_of_rows(value):
         return False
     return all(len(list(_leaves("", row))) == len(dict(_leaves("", value[0]))) for row in value[:2])
+
+
+def _batches(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
+    """The columns of rows that hold many samples each, one after another; nothing of others.
+
+    What is the same in all, such as the rate, is a single value.
+    """
+    many, several = 20, 2  # samples of a batch, more than a machine has axes; signals
+    sizes = {k: len(v) for k, v in rows[0].items() if isinstance(v, list) and len(v) > many}
+    alike = all(row.keys() == rows[0].keys() for row in rows) and len(rows) > 1
+    if len(sizes) < several or len({*sizes.values()}) > 1 or not alike:
+        return {}
+    out = {}
+    for key in rows[0]:
+        values = [row[key] for row in rows]
+        if key in sizes:
+            out[key] = _numeric([v for batch in values for v in batch])
+        else:
+            out[key] = np.array(values[:1] if all(v == values[0] for v in values) else values)
+    return out
 
 
 def _leaves(prefix: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -135,7 +164,7 @@ def recordings_of(columns: Mapping[str, NDArray]) -> tuple[str, ...]:
     """
     tables: dict[str, dict[str, NDArray]] = {}
     for name, column in columns.items():
-        parted = re.fullmatch(r"(.*?)(\[\d+\]|\.[^.\[\]]+)", name)
+        parted = re.fullmatch(r"(.*?)(\[\d+\]|[./][^./\[\]]+(?: \[[^\]]*\])?)", name)
         if parted is None:
             if len(column) > 1:
                 return ()
@@ -146,6 +175,8 @@ def recordings_of(columns: Mapping[str, NDArray]) -> tuple[str, ...]:
     fewest = 3  # columns of a recording: its times, a position and a force
     if len(tables) < 2 or len(keys) > 1 or len(next(iter(keys))) < fewest:
         return ()
+    if all(_RUN.search(name) for name in tables):
+        return tuple(tables)
     first, *others = tables.values()
     if any(all(np.array_equal(c, o[k]) for o in others) for k, c in first.items()):
         return ()

@@ -11,13 +11,14 @@ _SAMPLES = r"(?:sampl\w*|abtast\w*|scan\w*)"
 _LOGS = r"(?:record\w*|logg?\w*|acqui\w*|mess\w*|aufzeichn\w*|frame|update)"
 _RATE = (
     rf"(?:(?:{_SAMPLES}|{_LOGS})[\s_\-]*(?:rate|freq\w*|takt)|abtast(?:rate|frequenz)|samplerate"
-    r"|fréquence d.échantillonnage|采样(?:频率|率)|サンプリング周波数|^\W*(?:rate|fps)|\bf_?s)"
+    r"|fréquence d.échantillonnage|采样(?:频率|率)|サンプリング周波数|^\W*(?:rate|fps)"
+    r"|\bf_?s(?:_log\w*)?)"
 )
 _PERIOD = (
     rf"(?:{_SAMPLES}[\s_\-]*(?:time|zeit|step)|(?:{_SAMPLES}|{_LOGS})[\s_\-]*(?:period|interval)\w*"
     r"|abtast(?:zeit|intervall|periode)|tastzeit|zykluszeit|taktzeit|cycle[\s_]*time|time[\s_]*step"
     r"|période d.échantillonnage|采样(?:周期|间隔)|サンプリング(?:周期|間隔)"
-    r"|^\W*(?:period|interval|increment|delta[\s_]*t)|\bt_?s|\bd_?t)"
+    r"|^\W*(?:period|interval|increment|delta[\s_]*t)|\bt_?s(?:_log\w*)?|\bd_?t(?:_log\w*)?)"
 )
 _RATES = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "sa/s": 1.0, "ks/s": 1e3, "sps": 1.0,
           "samples/s": 1.0, "1/s": 1.0, "fps": 1.0}  # fmt: skip
@@ -40,24 +41,34 @@ _EVERY = re.compile(
     r"(?:every|jeder?)\s+(?P<every>\d+)(?:st|nd|rd|th|\.)?\s+(?:cycle|sample|point|takt|zyklus|wert)",
     re.IGNORECASE,
 )
+_OF_SAMPLES = re.compile(
+    rf"{_SAMPLES}|record|logg?|acqui|aufzeichn|\bf_?s\b|\bt_?s\b", re.IGNORECASE
+)
+_SAME = 0.02  # of a rate, by which two that are one do not differ
 _LONGEST = 300  # characters of a line that states a rate
 
 
 @dataclass(frozen=True)
 class StatedRate:
-    """A rate in Hz, None where the unit of what is stated is not; text: the words that state it."""
+    """A rate in Hz, None where it is not known; text: the words that state it.
+
+    unsure: why it is not known.
+    """
 
     rate: float | None
     text: str
+    unsure: str = "without a unit"
 
 
 def stated_rate(texts: Iterable[str]) -> StatedRate | None:
-    """The first rate that any of these texts states; one without a unit where no other is.
+    """The rate that these texts state; one without a unit where no other is.
 
-    Less where they state that only every so manieth sample of it is kept.
+    Of several that of samples or of the recording counts, before that of a cycle or a frame; where
+    they differ, none. Less where they state that only every so manieth sample of it is kept.
     """
     texts = list(texts)
     unsure, every = None, next((k for text in texts if (k := _kept(text)) > 1), 1)
+    known: list[tuple[bool, StatedRate]] = []
     for text in texts:
         plain = re.sub(r"(?<!\d),|,(?!\d)|[;\t|]", " ", text[:_LONGEST])
         for found in _STATEMENT.finditer(plain):
@@ -65,11 +76,17 @@ def stated_rate(texts: Iterable[str]) -> StatedRate | None:
             words = " ".join(text.replace("\t", " ").split())[:80]
             if rate is not None and every > 1:
                 return StatedRate(rate / every, f"{words}, one of {every} kept")
-            stated = StatedRate(rate, words)
             if rate is not None:
-                return stated
-            unsure = unsure or stated
-    return unsure
+                known.append((_OF_SAMPLES.search(found[0]) is None, StatedRate(rate, words)))
+            unsure = unsure or StatedRate(rate, words)
+    if not known:
+        return unsure
+    first = min(other for other, _ in known)
+    rates = [stated for other, stated in known if other is first]
+    if all(abs((r.rate or 0.0) / (rates[0].rate or 1.0) - 1.0) < _SAME for r in rates):
+        return rates[0]
+    texts = [*dict.fromkeys(r.text for r in rates)]
+    return StatedRate(None, "; ".join(texts), "and other rates")
 
 
 def _kept(text: str) -> int:
@@ -91,7 +108,5 @@ def _rate_of(found: re.Match[str]) -> float | None:
         return number * _RATES[unit]
     if unit in _PERIODS:
         return 1.0 / (number * _PERIODS[unit])
-    if found["rate"]:
-        return number
-    longest = 0.5  # s a sample, of what is recorded to be identified; more is in another unit
-    return 1.0 / number if number < longest else None
+    rate = number if found["rate"] else 1.0 / number
+    return rate if rate >= slowest else None  # slower is in another unit

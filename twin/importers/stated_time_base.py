@@ -52,13 +52,15 @@ class StatedTimeBase:
 
 def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTimeBase:
     """The time base of a table; columns: those of numbers (n,), all as long."""
-    if table.sample_rate is not None:
+    if (key := _text_key(table)) is not None:
+        return StatedTimeBase((f"# {key}",), NOMINAL, (), (key,))
+    counters = [name for name, column in columns.items() if counts(name, column)]
+    called, even = candidates(table, columns, counters)
+    if table.sample_rate is not None and not _are_otherwise(called, table.sample_rate):
         line = f"# the file states its sample rate: {table.sample_rate:g} Hz"
         return StatedTimeBase(
             (line,), 1.0 / table.sample_rate, tuple(n for n in columns if is_time(n))
         )
-    counters = [name for name, column in columns.items() if counts(name, column)]
-    called, even = candidates(table, columns, counters)
     stated = stated_rate([*table.notes, *_scalars(table)])
     rated = stated.rate if stated is not None else None
     found = called or _agreeing(even, rated, [*columns], counters)
@@ -72,6 +74,25 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
         lines = _of_rate(columns, counters, stated.rate, f"the file states {stated.text!r}")
         return StatedTimeBase(lines, 1.0 / stated.rate, used)
     return _asked(columns, counters, stated, used)
+
+
+def _are_otherwise(times: Sequence[Times], rate: float) -> bool:
+    """Whether even times tell another rate than the one (Hz) that a file states."""
+    fine = [one for one in times if not one.is_coarse and _has_rate(one.seconds)]
+    return bool(fine) and all(abs(one.step * rate - 1.0) > _OFF for one in fine)
+
+
+def _text_key(table: SignalTable) -> str | None:
+    """That a column of words tells rows of several axes apart, which come in turns."""
+    most, turns = 40, 3  # axes or signals; of how many turns at least
+    for name, raw in table.columns.items():
+        cells = np.asarray(raw)
+        once = [*dict.fromkeys(cells.tolist())] if cells.dtype.kind in "OUS" else []
+        count = len(once)
+        several = 1 < count <= most and len(cells) >= turns * count
+        if several and (cells[count:] == cells[:-count]).all():
+            return mixed_rows(name, [*map(str, once)])
+    return None
 
 
 def _disagreeing_times(found: Sequence[Times], names: Sequence[str]) -> str | None:
@@ -132,6 +153,7 @@ def _of_times(
               for other in found if other is not time and other.duration > 0.0]  # fmt: skip
     order = order_of(time.seconds)
     steps = np.diff(time.seconds if order is None else time.seconds[order])
+    first, last, missing = 1, len(time.seconds), tuple[str, ...]()
     if order is None and len(parts := parts_of(time.seconds)) > 1:
         first, last = max(parts, key=lambda part: part[1] - part[0])
         told = " and ".join(f"[{a}, {b}]" for a, b in parts if b > a != first)
@@ -139,7 +161,10 @@ def _of_times(
             f"rows = [{first}, {last}] # the longest of {len(parts)} parts; the others: {told}"
         )
         steps = steps[first - 1 : last - 1]
+        if last - first < 0.1 * len(time.seconds):
+            missing = (f"{time.name} leaps in {len(parts) - 1} places, so that no part is of use",)
     again = repeated_rows({n: c for n, c in columns.items() if n != time.name}, time.seconds)
+    again = again[(again >= first) & (again < last)] - (first - 1)  # of the part that is taken
     off = np.abs(np.delete(steps, again - 1) - time.step)
     whole = len(steps) == len(time.seconds) - 1 and order is None and not len(again)
     if len(off) and (off.max() > 0.01 * time.step or (whole and not _has_rate(time.seconds))):
@@ -150,7 +175,7 @@ def _of_times(
         )
     if stated and stated.rate and abs(stated.rate * time.step - 1.0) > _OFF:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
-    return StatedTimeBase(tuple(lines), time.step, used)
+    return StatedTimeBase(tuple(lines), time.step, used, missing)
 
 
 def _key(columns: Mapping[str, Array], rows: int) -> str | None:
@@ -195,7 +220,9 @@ def _scalars(table: SignalTable) -> Iterator[str]:
     """The values beside the columns of a file, as text."""
     for name, column in table.columns.items():
         if len(column) == 1 and np.asarray(column).dtype.kind in "fiu":
-            yield f"{re.split(r'[./]', name)[-1]} = {float(column[0]):.12g}"
+            units = (table.columns.get(f"{name}{word}", ()) for word in ("_unit", "_units"))
+            unit = next((str(u[0]) for u in units if len(u) == 1), "")
+            yield f"{re.split(r'[./]', name)[-1]} = {float(column[0]):.12g} {unit}"
 
 
 def _asked(
@@ -203,7 +230,7 @@ def _asked(
     used: tuple[str, ...],
 ) -> StatedTimeBase:  # fmt: skip
     """The lines that ask for a time base."""
-    unit = "" if stated is None else f"; the file states {stated.text!r} without a unit"
+    unit = "" if stated is None else f"; the file states {stated.text!r} {stated.unsure}"
     lines = []
     for name in counters[:1]:
         count = _count_of(columns[name])

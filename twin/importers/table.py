@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from twin.errors import InputError, near
 from twin.files import atomic_writer
+from twin.importers.proposal.names import unit_of
 from twin.installed import pip_install
 from twin.logs import Log
 from twin.logs.container import LARGEST_RATIO
@@ -132,7 +133,7 @@ def with_unit(name: str, unit: str, asked: Collection[str]) -> str:
 
     unit: "" where none is stated.
     """
-    plain = not unit or name in asked or name.endswith(("]", ")"))
+    plain = not unit or name in asked or bool(unit_of(name, bracketed=True))
     return name if plain else f"{name} [{unit}]"
 
 
@@ -160,6 +161,17 @@ def numbers(name: str, raw: NDArray) -> Array:
         place = f": {array.flat[row - 1]!r} in row {row}" if row else ""
         raise InputError(f"column '{name}' does not hold one real number a row{place}")
     return array.astype(np.float64)
+
+
+def as_numbers(raw: NDArray) -> NDArray:
+    """Cells (n,) that are numbers as text, decimals or none (NaN) as numbers, or as they are."""
+    array = np.asarray(raw)
+    if array.dtype.kind not in "OUS" or array.ndim != 1 or len(array) < 2:
+        return array
+    try:
+        return np.array([np.nan if c in (None, "") else float(c) for c in array.tolist()])
+    except (TypeError, ValueError):
+        return array
 
 
 def mixed_rows(name: str, values: Sequence[str]) -> str:

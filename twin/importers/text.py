@@ -36,6 +36,7 @@ _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")
 )  # fmt: skip
 _HUNDREDS = re.compile(r"[-+]?[1-9]\d\d")  # a whole number just below a thousand
+_PACKED = (b"PK\x03\x04", b"\x1f\x8b")  # of zip, in which workbooks are too, and of gzip
 _ENDS = re.compile(r"\r\n|\r|\n")
 _BLOCK = 1024  # lines read at once: few enough that one bad cell makes few of them slow
 
@@ -53,6 +54,8 @@ class Head:
         with open(path, "rb") as stream:
             data = stream.read(HEAD)
             whole = not stream.read(1)
+        if data.startswith(_PACKED):
+            raise InputError("is compressed, or a workbook, whatever its name; give a .csv of it")
         encoding = _encoding(data)
         lines = _ENDS.split(data.decode(encoding, errors="replace"))
         lines = lines if whole else lines[:-1]

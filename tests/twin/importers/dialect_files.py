@@ -144,6 +144,11 @@ def rosbag(path: Path) -> None:
             writer.write(connection, ns + 7 * (k % 5), store.serialize_ros1(message, kind))
 
 
+def feather(path: Path) -> None:
+    arrow, writer = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.feather")
+    writer.write_feather(arrow.table({"t": T, "q": Q, "f": F}), path)
+
+
 SAMPLES = {
     "csv": Sample("a.csv", text(lambda k: f"{T[k]:.3f},{Q[k]},{F[k]}", "t,pos,u"), "pos", "u"),
     "twincat": Sample("a.csv", text(twincat, TWINCAT, "\r\n"), "MAIN.fPos", "MAIN.fTorque"),
@@ -183,6 +188,10 @@ SAMPLES = {
     "json": Sample(
         "a.json", lambda path: path.write_text(json.dumps(
             {"fs": 250, "q": Q.tolist(), "f": F.tolist()})) and None, "q", "f", is_text=False,
+    ),
+    "feather": Sample("a.feather", feather, "q", "f", is_text=False),
+    "npz": Sample(
+        "a.npz", lambda path: np.savez(path, fs=250.0, q=Q, f=F), "q", "f", is_text=False
     ),
     "parquet": Sample("a.parquet", parquet, "q", "f", is_text=False),
     "lerobot": Sample(

@@ -243,7 +243,7 @@ def test_what_a_file_states_itself_is_believed(tmp_path, name, write, text, rate
          "'r/0' has a sample every 0.01 s, 'r/1' every 0.02 s"),
         ("log.parquet", changed(write_parquet, t=DATES), DATED.replace('"s"', '"ms"'),
          "holds dates"),
-        ("log.parquet", changed(write_parquet, q=np.arange(COUNT).astype(str)), MAP,
+        ("log.parquet", changed(write_parquet, q=[f"no {k}" for k in range(COUNT)]), MAP,
          "column 'q' does not hold one real number .* row 1"),
         ("log.parquet", changed(write_parquet, q=[*range(7), None, *range(COUNT - 8)]), MAP,
          "column 'q' is nan in row 8 of 300"),
@@ -254,7 +254,7 @@ def test_what_a_file_states_itself_is_believed(tmp_path, name, write, text, rate
         ("log.xyz", changed(write_csv), MAP, r"ends in '\.xyz', known are \.csv"),
         ("log.xlsx", changed(write_csv), MAP, r"is a workbook; save the sheet"),
         ("log.xyz", changed(write_csv), 'format = "xlsx"\n' + MAP,
-         "format = 'xlsx'; allowed: csv, halsampler"),
+         "format = 'xlsx'; allowed: csv, feather, halsampler"),
         ("none.csv", lambda path: None, MAP, r"none\.csv: cannot be read"),
     ],
 )  # fmt: skip

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from twin.importers.mapping import ImportMap
     from twin.importers.table import SignalTable
 
+PACKED = (".gz", ".zip", ".bz2", ".xz", ".7z", ".zst")
 SHEETS = (".xlsx", ".xls", ".xlsm", ".ods")  # of workbooks, which hold more than a table
 
 
@@ -56,6 +57,8 @@ def find_dialect(path: Path, stated: str | None) -> str:
         return stated
     endings = (path.suffix.lower(),) if stated is None else known[stated].endings
     fitting = {name: d for name, d in known.items() if set(endings) & set(d.endings)}
+    if not fitting and path.suffix.lower() in PACKED:
+        raise InputError("is compressed; unpack it first")
     if not fitting and path.suffix.lower() in SHEETS:
         raise InputError("is a workbook; save the sheet with the measurement as .csv")
     if not fitting:

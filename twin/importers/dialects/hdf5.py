@@ -30,8 +30,10 @@ def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
     wanted = mapping.column_names()
     with parsing("HDF5"), h5py.File(path, "r") as file:
         datasets: dict[str, Any] = {}
+        said = [file.attrs]
 
         def visit(name: str, item: Any) -> None:
+            said.append(item.attrs)
             if isinstance(item, h5py.Dataset) and not name.startswith("#"):
                 datasets[name.replace("/", separator)] = item
 
@@ -44,15 +46,46 @@ def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
                 size += float(dataset.size or 0) * dataset.dtype.itemsize
                 require_fits(size, path)
                 if dataset.ndim in (0, 1, 2):
-                    values, parts = np.asarray(dataset[()]), dataset.dtype.names
+                    values, parts = _scaled(dataset), dataset.dtype.names
                     own = {f"{name}{separator}{part}": values[part] for part in parts or ()}
                     for key, column in (own or {name: values}).items():
-                        split = split_columns(key, column)
+                        split = _named(
+                            f"{key}{separator}", split_columns(key, column), dataset.attrs
+                        )
                         unit = _unit_of(dataset)
                         columns |= {with_unit(k, unit, wanted): v for k, v in split.items()}
         require_columns(wanted, {**datasets, **columns})  # lists all there are
-        notes = tuple(f"{k}: {v}" for k, v in file.attrs.items() if np.size(v) == 1)
+        entries = dict.fromkeys(f"{k}: {v}" for one in said for k, v in one.items()
+                                if np.size(v) == 1)  # fmt: skip
+        notes = tuple(entries)
         return SignalTable({name: columns[name] for name in chosen(wanted, columns)}, notes=notes)
+
+
+def _scaled(dataset: Any) -> NDArray:
+    """The values of a dataset, of packed ones as its attributes say (CF Conventions, 8.1)."""
+    values, attributes = np.asarray(dataset[()]), dataset.attrs
+    fill = [attributes[k] for k in ("_FillValue", "missing_value") if k in attributes]
+    packed = [k for k in ("scale_factor", "add_offset") if k in attributes]
+    if values.dtype.kind not in "fiu" or not (fill or packed):
+        return values
+    scale = float(np.ravel(attributes.get("scale_factor", 1.0))[0])
+    offset = float(np.ravel(attributes.get("add_offset", 0.0))[0])
+    return np.where(np.isin(values, fill), np.nan, values * scale + offset)
+
+
+def _named(above: str, columns: dict[str, NDArray], attributes: Any) -> dict[str, NDArray]:
+    """The columns of a matrix as an attribute with as many names calls them, if one does.
+
+    above: what stands before these names.
+    """
+    for stated in map(np.ravel, attributes.values() if len(columns) > 1 else ()):
+        texts = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in stated.tolist()]
+        if len(texts) == 1 and isinstance(texts[0], str):
+            texts = [text.strip() for text in texts[0].split(",")]
+        names = [f"{above}{text}" for text in texts if isinstance(text, str)]
+        if len({*names}) == len(columns):
+            return dict(zip(names, columns.values(), strict=True))
+    return columns
 
 
 def _unit_of(dataset: Any) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
-from twin.importers.nested import ROWS, flat, recordings_of
+from twin.importers.nested import ROWS, flat
 from twin.importers.table import SignalTable, chosen, parsing
 
 
@@ -22,14 +22,7 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
     with parsing("JSON"):
         content = _content(path.read_text(encoding="utf-8-sig"))
         columns = flat(content if isinstance(content, dict) else {ROWS: content})
-    wanted = mapping.column_names()
-    if not wanted and (found := recordings_of(columns)):
-        some = next(name for name in columns if name.startswith(found[0]))
-        raise InputError(
-            f"holds {len(found)} recordings: {', '.join(found)}; give each as a file of its own, "
-            f"or name the columns of one in a map, such as '{some}'"
-        )
-    return SignalTable({name: columns[name] for name in chosen(wanted, columns)})
+    return SignalTable({name: columns[name] for name in chosen(mapping.column_names(), columns)})
 
 
 def _content(text: str) -> Any:
@@ -40,7 +33,19 @@ def _content(text: str) -> Any:
         lines = [line for line in text.splitlines() if line.strip()]
         if len(lines) < 2 or (error.lineno == 1 and not text.startswith("{")):
             raise
-        return [json.loads(line) for line in lines]
+        return _rows(lines)
+
+
+def _rows(lines: list[str]) -> list[Any]:
+    """What each line holds, but of the last one where it was cut off."""
+    rows = []
+    for number, line in enumerate(lines, 1):
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError as error:
+            if number < len(lines):
+                raise InputError(f"line {number} is no JSON: {error}") from error
+    return rows
 
 
 DIALECT = Dialect("JSON", (".json", ".jsonl", ".ndjson"), read)

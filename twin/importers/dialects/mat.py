@@ -1,4 +1,4 @@
-"""MATLAB: versions 4 to 7.2 through SciPy, 7.3 as the HDF5 file it is.
+"""MATLAB: versions 4 to 7.2 through SciPy, 7.3 as the HDF5 file that it is.
 
 A field of a struct is named ``struct.field``. Simulink's structures with time are
 ``name.time`` and, for each signal, ``name.signals.label``; arrays of To File have the times first.
@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import scipy.io
 from numpy.typing import NDArray
 from scipy.io.matlab import MatlabOpaque
 
 from twin.errors import InputError
-from twin.importers.dialects import Dialect, hdf5
+from twin.importers import matlab_hdf
+from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.nested import flat
 from twin.importers.table import SMALLEST_TABLE, SignalTable, chosen, parsing, require_fits
@@ -32,7 +34,7 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
     with open(path, "rb") as stream:
         head = stream.read(matlab_header + len(_SIGNATURE))
     if head.startswith(_SIGNATURE) or head[matlab_header:] == _SIGNATURE:  # of version 7.3
-        return hdf5.read(path, mapping, separator=".")
+        return SignalTable(_columns(matlab_hdf.content_of(path), mapping.column_names()))
     with parsing("MAT"):
         content = content_bytes(path)
     shortest = 5.0  # s that a MAT file may take, whatever its size
@@ -84,9 +86,17 @@ def _inflated(data: bytes) -> Iterator[int]:
 def _load(path: Path, names: Sequence[str]) -> dict[str, NDArray]:
     with parsing("MAT"):
         content = scipy.io.loadmat(path, simplify_cells=True)
-    opaque = [k for k, v in content.items() if isinstance(v, MatlabOpaque)]
-    columns = flat({k: v for k, v in content.items() if not k.startswith("__")})
-    if opaque and not set(names) <= set(columns):
+    kept = {k: v for k, v in content.items() if not k.startswith("__")}
+    return _columns({k: None if isinstance(v, MatlabOpaque) else v for k, v in kept.items()}, names)
+
+
+def _columns(content: Mapping[str, Any], names: Sequence[str]) -> dict[str, NDArray]:
+    """The columns of variables, None for an object, that are asked for; all for none."""
+    columns = flat({k: v for k, v in content.items() if v is not None})
+    opaque = any(v is None for v in content.values())
+    few = 20  # rows; no recording of fewer is of use
+    none = not any(len(c) > few for c in columns.values()) if not names else False
+    if opaque and (none or not set(names) <= set(columns)):
         raise InputError(
             "holds objects of MATLAB, such as timeseries or a Dataset of Simulink, which only "
             "MATLAB reads; save structures with time, or arrays: t = x.Time; q = x.Data"

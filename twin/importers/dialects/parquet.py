@@ -40,12 +40,24 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
 def read_columns(path: Path, file: Any, wanted: Iterable[str]) -> dict[str, NDArray]:
     """The columns of an open file that begin with these names, all for none, lists taken apart."""
     asked = set(wanted)
-    names = [n for n in file.schema_arrow.names if not asked or n in asked]
+    made = tuple(re.split(r"\.| \[", name)[0] for name in asked)  # of a table within it, of a time
+    names = [n for n in file.schema_arrow.names if not asked or n in asked or n in made]
     require_fits(8.0 * file.metadata.num_rows * len(names), path)
-    table = file.read(columns=names)
+    return columns_of(file.read(columns=names))
+
+
+def columns_of(table: Any) -> dict[str, NDArray]:
+    """The columns of a table of Arrow, lists and tables within it taken apart."""
+    types = extra("pyarrow.types")
+    while any(types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
     columns: dict[str, NDArray] = {}
-    for name in names:
-        values = table.column(name).to_numpy()
+    for field in table.schema:
+        name, cells = field.name, table.column(field.name)
+        if types.is_time(field.type):  # of day, as counts of its unit
+            cells = cells.cast("int64" if field.type.bit_width == 64 else "int32")
+            name = f"{name} [{field.type.unit}]"
+        values = cells.to_numpy()
         if values.dtype == object and len(values) and isinstance(values[0], np.ndarray):
             if len({np.shape(v) for v in values}) > 1 or values[0].ndim != 1:
                 continue
@@ -59,7 +71,12 @@ def read_columns(path: Path, file: Any, wanted: Iterable[str]) -> dict[str, NDAr
 
 def notes_of(file: Any) -> tuple[str, ...]:
     """The short entries of its metadata, of which one may state the rate."""
-    metadata = file.schema_arrow.metadata or {}
+    return entries_of(file.schema_arrow)
+
+
+def entries_of(schema: Any) -> tuple[str, ...]:
+    """The short entries of the metadata of a schema of Arrow."""
+    metadata = schema.metadata or {}
     entries = (f"{k.decode()}: {v.decode(errors='replace')}" for k, v in metadata.items())
     return tuple(entry for entry in entries if len(entry) < _LONGEST)
 

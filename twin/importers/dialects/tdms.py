@@ -24,7 +24,9 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
         }
         read = {name: channels[name] for name in chosen(asked, channels)}
         require_fits(sum(8.0 * len(channel) for channel in read.values()), path)
-        periods = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
+        stated = {n: c.properties[_PERIOD] for n, c in read.items() if _PERIOD in c.properties}
+        # 1 s is what writers leave it at, and no drive is recorded at
+        periods = {n: period for n, period in stated.items() if period != 1.0}
         for name, period in periods.items():
             first, expected = next(iter(periods.items()))
             if period != expected or not period > 0.0:
@@ -33,7 +35,10 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
                     f"{period:.9g} s; export them at one rate"
                 )
         rate = 1.0 / next(iter(periods.values())) if periods else None
-        return SignalTable({name: c[:] for name, c in read.items()}, rate)
+        said = (file, *file.groups(), *read.values())
+        notes = dict.fromkeys(f"{k}: {v}" for one in said for k, v in one.properties.items()
+                              if k != _PERIOD)  # fmt: skip
+        return SignalTable({n: c[:] for n, c in read.items()}, rate, notes=tuple(notes))
 
 
 DIALECT = Dialect("TDMS of LabVIEW", (".tdms",), read)

@@ -1,0 +1,30 @@
+"""NumPy: an archive of arrays by name, or one array, whose columns go by field or by number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from twin.importers.dialects import Dialect
+from twin.importers.mapping import ImportMap
+from twin.importers.nested import ROWS, flat
+from twin.importers.table import SignalTable, chosen, parsing
+
+
+def read(path: Path, mapping: ImportMap) -> SignalTable:
+    """Columns of a NumPy file; raises InputError. No objects are unpickled: they may run code."""
+    with parsing("NumPy"):
+        loaded = np.load(path, allow_pickle=False)
+        arrays = dict(loaded) if isinstance(loaded, np.lib.npyio.NpzFile) else {ROWS: loaded}
+        content: dict[str, Any] = {}
+        for name, array in arrays.items():
+            fields = array.dtype.names or ()
+            above = f"{name}." if len(arrays) > 1 else ""
+            content |= {f"{above}{f}": array[f] for f in fields} if fields else {name: array}
+        columns = flat(content)
+    return SignalTable({name: columns[name] for name in chosen(mapping.column_names(), columns)})
+
+
+DIALECT = Dialect("NumPy", (".npz", ".npy"), read)
