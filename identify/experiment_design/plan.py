@@ -91,7 +91,7 @@ def plan(
     holdout: GivenLogs | None = None,
     *,
     catalogue: Catalogue | None = None,
-    between: Sequence[Rival | str | Path] = (),
+    between: Rival | str | Path | Sequence[Rival | str | Path] = (),
     axis: str | None = None,
     duration: float = DURATION,
     test_function: float | None = None,
@@ -113,7 +113,8 @@ def plan(
     if axis is not None:
         model.axis(axis)
     require_length(duration, model.sample_rate)
-    rivals = rivals_of(between, catalogue)
+    single = isinstance(between, str | Path | Effect | MachineModel)
+    rivals = rivals_of([between] if single else between, catalogue)
     for rival in rivals:
         if isinstance(rival, Effect):
             model.require_usable(rival, axis or next(iter(model.axes)))

@@ -35,7 +35,7 @@ def _require_of_one_axis(name: str, model: MachineModel, axis: str) -> None:
 
 def simulate(
     model: MachineModel | str | Path,
-    experiment: str | Experiment,
+    experiment: str | Path | Experiment,
     *,
     seed: int = 0,
     duration: float | None = None,
@@ -46,15 +46,20 @@ def simulate(
     """Run an experiment on the twin and return its log, with the truth topics.
 
     model: or the path of its file, or the name of one of the package. experiment: a name, or an
-    experiment with its own parameters. Of a named one: duration in s (20 where None), kept by all
-    but those whose moves take longer; axis, the one that moves where the experiment moves one, the
-    first where None. The same seed gives the same log. simulator: MuJoCo's, or one of
-    ``twin.simulation.simulators``, whose FineSimulator takes ten steps a sample; a friction of
-    sigma2 seems to lighten the mass by sigma2 times half a step. Raises InputError for an unknown
-    experiment or axis, and for a setpoint outside the travel.
+    experiment with its own parameters, or the path of its file. Of a named one: duration in s (20
+    where None), kept by all but those whose moves take longer; axis, the one that moves where the
+    experiment moves one, the first where None. The same seed gives the same log. simulator:
+    MuJoCo's, or one of ``twin.simulation.simulators``, whose FineSimulator takes ten steps a
+    sample; a friction of sigma2 seems to lighten the mass by sigma2 times half a step. Raises
+    InputError for an unknown experiment or axis, and for a setpoint outside the travel.
     """
-    from twin.model.file import as_model  # which loads what reads files
+    from twin.experiments.file import SUFFIX, load_experiment  # which load what reads files
+    from twin.model.file import as_model
 
+    if isinstance(experiment, str) and experiment.endswith(SUFFIX):
+        experiment = Path(experiment)
+    if isinstance(experiment, Path):
+        experiment = load_experiment(experiment)
     return joined(
         simulate_parts(
             as_model(model), experiment, seed=seed, duration=duration, axis=axis,

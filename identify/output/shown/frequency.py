@@ -90,6 +90,8 @@ def _plant(plant: Plant, period: float, units: AxisUnits) -> list[tuple[str, str
     if _is_there(plant.stiffness):
         facts.append(("stiffness", _with_band(plant.stiffness, units("N/m"))))
     delay = f"{_with_band(plant.delay, 's')}, {plant.delay.value / period:.2f} samples"
+    if plant.delay.value + 2.0 * plant.delay.band < 0.0:  # surely
+        delay += ": none can be; the force is logged late, or its sign is reversed"
     facts.append(("delay", delay if math.isfinite(plant.delay.band) else "not told"))
     for i, mode in enumerate(plant.modes, start=1):
         frequency, ratio = _with_band(mode.frequency, "Hz"), _with_band(mode.damping, "1")

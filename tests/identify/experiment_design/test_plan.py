@@ -156,6 +156,7 @@ def test_without_rivals_the_experiment_says_most_about_the_model():
     stage = stage_of()
     with pytest.raises(InputError, match="different"):
         plan(stage, between=[CATALOGUE["cogging"]] * 2, catalogue=CATALOGUE)
+    assert plan(stage, between="cogging", catalogue=CATALOGUE, duration=4.0).between == ("cogging",)
     found = plan(stage, catalogue=CATALOGUE, duration=4.0)
     assert found.decides
     assert found.between == (stage.name,)

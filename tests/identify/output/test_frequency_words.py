@@ -112,6 +112,8 @@ def test_what_does_not_tell_is_said_to() -> None:
     assert "spread" not in unknown
     without = told(replace(SHOWN, response=replace(RESPONSE, closed=nan * ONES)))
     assert "what noise makes of the force in a closed one counts" in without["setpoint"]
+    early = told(replace(SHOWN, plant=replace(PLANT, delay=Banded(-2.2e-3, 1e-3))))["delay"]
+    assert early.endswith("none can be; the force is logged late, or its sign is reversed")
     endless = replace(PLANT, mass=Banded(3.1, inf))
     assert told(replace(SHOWN, plant=endless))["mass"] == "not told"
     assert told(SHOWN, replace(AXIS, bias=Bias(3.0, None))).keys() == {

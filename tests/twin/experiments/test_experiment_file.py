@@ -184,3 +184,12 @@ def test_a_long_table_is_written_in_parts_without_a_gap(tmp_path):
     time = np.loadtxt(tmp_path / "s.csv", delimiter=",", skiprows=1, usecols=0)
     assert len(time) > 1.05e5  # parts are of 1e5 rows
     np.testing.assert_allclose(np.diff(time), 1e-4, atol=1e-7)
+
+
+def test_an_experiment_is_simulated_from_its_file(tmp_path):
+    path, chosen = tmp_path / "e.toml", Rests("y", span=1e-3, speed=1e-3, rests=(0.1, 0.2))
+    save_experiment(chosen, path, "why")
+    own = simulate(PROTON, chosen, seed=1, simulator=ReducedSimulator)
+    for given in (path, str(path)):
+        log = simulate(PROTON, given, seed=1, simulator=ReducedSimulator)
+        np.testing.assert_array_equal(log.axes["y"].position, own.axes["y"].position)
