@@ -30,7 +30,7 @@ def flat(content: Mapping[str, Any]) -> dict[str, NDArray]:
 def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict[str, NDArray]:
     """The same, called ``prefix`` and a key; outer: the names that a matrix may have."""
     columns: dict[str, NDArray] = {}
-    names = next((v for v in content.values() if _are_all(str, v)), outer)
+    names = next((v for v in map(_texts, content.values()) if v), outer)
     matrices = [k for k, v in content.items() if isinstance(v, list) and _are_all(list, v)]
     for key, value in content.items():
         name = f"{prefix}{key}"
@@ -59,17 +59,29 @@ def _flat(prefix: str, content: Mapping[str, Any], outer: Sequence[str]) -> dict
         elif _are_all(str, value) and is_stamp(value[0]):
             columns[name] = np.array(value)
         elif isinstance(value, list) and not _are_all(str, value):
-            split = split_columns(name, _numeric(value))
-            if len(names) == len(split) > 1:
-                several = len(matrices) > 1 or names is outer
-                split = {f"{name}.{n}" if several else f"{prefix}{n}": c
-                         for n, c in zip(names, split.values(), strict=True)}  # fmt: skip
-            columns |= split
+            above = f"{name}." if len(matrices) > 1 or names is outer else prefix
+            columns |= _called(names, above, split_columns(name, _numeric(value)))
         elif isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 1:
             columns |= _flat(prefix, {key: value.tolist()}, names)
         elif isinstance(value, np.ndarray | np.generic | int | float | str):
-            columns |= split_columns(name, np.asarray(value))
+            columns |= _called(names, prefix, split_columns(name, np.asarray(value)))
     return columns
+
+
+def _texts(value: Any) -> list[str]:
+    """The texts in a list, or a cell array, of as many as may be the names of a matrix' columns."""
+    many = 400  # columns, more than any machine has signals
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        value = value.tolist()
+    named = _are_all(str, value) and len(value) <= many
+    return [text.strip() for text in value] if named else []
+
+
+def _called(names: Sequence[str], above: str, split: dict[str, NDArray]) -> dict[str, NDArray]:
+    """The columns of a matrix by their names, where there are as many."""
+    if not len(names) == len(split) > 1:
+        return split
+    return {f"{above}{name}": c for name, c in zip(names, split.values(), strict=True)}
 
 
 def _are_all(kind: type, value: Any) -> bool:
@@ -178,6 +190,8 @@ def recordings_of(columns: Mapping[str, NDArray]) -> tuple[str, ...]:
     if all(_RUN.search(name) for name in tables):
         return tuple(tables)
     first, *others = tables.values()
+    if not any(c.dtype.kind in "fiuM" and (c[1:] > c[:-1]).all() for c in first.values()):
+        return ()  # without times of its own
     if any(all(np.array_equal(c, o[k]) for o in others) for k, c in first.items()):
         return ()
     return tuple(tables)

@@ -220,9 +220,12 @@ def _scalars(table: SignalTable) -> Iterator[str]:
     """The values beside the columns of a file, as text."""
     for name, column in table.columns.items():
         if len(column) == 1 and np.asarray(column).dtype.kind in "fiu":
-            units = (table.columns.get(f"{name}{word}", ()) for word in ("_unit", "_units"))
+            stem = name.removesuffix(".value")  # {"value": 2, "unit": "kHz"}
+            units = (
+                table.columns.get(f"{stem}{word}", ()) for word in ("_unit", "_units", ".unit")
+            )
             unit = next((str(u[0]) for u in units if len(u) == 1), "")
-            yield f"{re.split(r'[./]', name)[-1]} = {float(column[0]):.12g} {unit}"
+            yield f"{re.split(r'[./]', stem)[-1]} = {float(column[0]):.12g} {unit}"
 
 
 def _asked(

@@ -174,6 +174,15 @@ def as_numbers(raw: NDArray) -> NDArray:
         return array
 
 
+def notes_of(entries: Mapping[str, object]) -> list[str]:
+    """Attributes of a file as text, each with the unit that another one states for it."""
+    return [
+        f"{key}: {value} {entries.get(f'{key}_unit', '')}".rstrip()
+        for key, value in entries.items()
+        if np.size(np.asarray(value, dtype=object)) == 1
+    ]
+
+
 def mixed_rows(name: str, values: Sequence[str]) -> str:
     """That rows are of several axes or signals, which a column of that name tells apart."""
     return (

@@ -93,6 +93,18 @@ def matrix(path: Path) -> Path:
     return hdf5(path, {"log": (np.c_[T, 1e3 * Q, F], {"columns": "time [s],pos [mm],force [N]"})})
 
 
+def cells(path: Path) -> Path:
+    """A matrix, and the names of its columns in a cell array."""
+    names = np.array(["Time (s)", "Position (mm)", "Force (N)"], dtype=object)
+    savemat(path, {"data": np.c_[T, 1e3 * Q, F], "names": names})
+    return path
+
+
+def rate_with_its_unit_beside(path: Path) -> Path:
+    entries = {n: PLAIN[n] for n in ("position", "force")}
+    return hdf5(path, entries, sampling_interval=500.0, sampling_interval_unit="us")
+
+
 def preallocated(path: Path) -> Path:
     return hdf5(path, {n: (np.r_[v, TAIL], a) for n, (v, a) in PLAIN.items()})
 
@@ -187,7 +199,8 @@ def rate_in_kilohertz(path: Path) -> Path:
     ("name", "write"),
     [
         ("a.h5", packed), ("a.h5", matrix), ("a.h5", preallocated), ("a.h5", beside_a_longer_one),
-        ("a.h5", two_rates_stated), ("a.json", rate_in_kilohertz), ("a.jsonl", batches),
+        ("a.h5", two_rates_stated), ("a.mat", cells), ("a.h5", rate_with_its_unit_beside),
+        ("a.json", rate_in_kilohertz), ("a.jsonl", batches),
         ("a.mat", mat73), ("a.feather", arrow), ("a.npy", records_of_numpy), ("a.npz", archive),
         ("a.parquet", decimals), ("a.parquet", structs), ("a.json", of_pandas),
         ("a.jsonl", numbers_as_text),
@@ -225,6 +238,13 @@ def of_axes(path: Path) -> Path:
 
 def runs(path: Path) -> Path:
     return hdf5(path, {f"run_{k}/{n}": one for k in (1, 2, 3) for n, one in PLAIN.items()})
+
+
+def test_axes_without_times_of_their_own_are_no_recordings(tmp_path: Path) -> None:
+    entries = {n: PLAIN[n] for n in ("position", "force")}
+    both = {f"axis_{a}/{n}": one for a in "xy" for n, one in entries.items()}
+    log = imported(hdf5(tmp_path / "a.h5", both, sample_rate=RATE))
+    assert (log.axes.keys(), log.sample_rate) == ({"x", "y"}, RATE)
 
 
 def two_periods(path: Path) -> Path:

@@ -14,6 +14,7 @@ from twin.importers.table import (
     SignalTable,
     chosen,
     extra,
+    notes_of,
     parsing,
     require_columns,
     require_fits,
@@ -55,9 +56,7 @@ def read(path: Path, mapping: ImportMap, separator: str = "/") -> SignalTable:
                         unit = _unit_of(dataset)
                         columns |= {with_unit(k, unit, wanted): v for k, v in split.items()}
         require_columns(wanted, {**datasets, **columns})  # lists all there are
-        entries = dict.fromkeys(f"{k}: {v}" for one in said for k, v in one.items()
-                                if np.size(v) == 1)  # fmt: skip
-        notes = tuple(entries)
+        notes = tuple(dict.fromkeys(note for one in said for note in notes_of(dict(one))))
         return SignalTable({name: columns[name] for name in chosen(wanted, columns)}, notes=notes)
 
 

@@ -7,7 +7,15 @@ from pathlib import Path
 from twin.errors import InputError
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
-from twin.importers.table import SignalTable, chosen, extra, parsing, require_fits, with_unit
+from twin.importers.table import (
+    SignalTable,
+    chosen,
+    extra,
+    notes_of,
+    parsing,
+    require_fits,
+    with_unit,
+)  # fmt: skip
 
 _PERIOD = "wf_increment"  # s a sample
 _UNIT = "unit_string"
@@ -36,8 +44,8 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
                 )
         rate = 1.0 / next(iter(periods.values())) if periods else None
         said = (file, *file.groups(), *read.values())
-        notes = dict.fromkeys(f"{k}: {v}" for one in said for k, v in one.properties.items()
-                              if k != _PERIOD)  # fmt: skip
+        entries = ({k: v for k, v in one.properties.items() if k != _PERIOD} for one in said)
+        notes = dict.fromkeys(note for one in entries for note in notes_of(one))
         return SignalTable({n: c[:] for n, c in read.items()}, rate, notes=tuple(notes))
 
 
