@@ -121,9 +121,8 @@ def noise_of(axis: AxisModel, motion: Motion, fastest: float | None = None) -> N
     force, reading = max(force, numbers), max(reading, _rounding_of(motion.position, dt))
     # Rounding is white in the mean alone: where it has less in the band, it has more below it.
     plain = max(reading, white_rounding(motion.resolution, dt))
-    # 1.5 times the reading's noise where the band begins; above it the force's noise shows: within
-    # 15 % in 17 logs of machines whose noise is known, where at 0.4 times most it was 5 times that
-    most = max(force, 1.5 * plain * float(bend[band][0]))
+    # times the reading's noise where the band begins; above it the force's noise shows
+    most = max(force, 3.0 * plain * float(bend[band][0]))
     if force < most:  # by as much as the motor makes of its command
         made, asked = (np.mean(u**2) for u in (actual_force(axis, motion), motion.raw[1]))
         force = max(motion.command_noise * float(made / asked if asked else 1.0), numbers)

@@ -195,20 +195,6 @@ def test_rounding_is_not_taken_for_noise_of_the_force():
     assert found.most >= 3.0 * white_rounding(5e-7, 1e-4)
 
 
-def test_noise_of_a_force_in_no_command_shows_above_that_of_the_readings_by_half():
-    """As of an encoder of 0.1 um on 1 kHz, where a rough track is twice as noisy in the band."""
-    dt, step = 1e-3, 1e-7
-    quiet = noise_of(PLAIN, rounded(step, 1.0 / dt, 0.1, 0.05, 1.0, duration=20.0).motion)
-    edge = white_rounding(step, dt) * float(quiet.bend[quiet.frequency > 50.0][0])
-    rough = np.random.default_rng(3).normal(0.0, np.sqrt(edge / dt), 20_000)  # of power 2 edge
-    t = dt * np.arange(len(rough))
-    x = 0.05 * np.sin(2.0 * np.pi * t) + dt**2 * np.cumsum(np.cumsum(rough)) / MASS
-    u = -0.05 * (2.0 * np.pi) ** 2 * MASS * np.sin(2.0 * np.pi * (t + 0.5 * dt))
-    log = log_of(1.0 / dt, step * np.rint(x / step), u)
-    found = noise_of(PLAIN, motion_of(log, "x", "log", ripples=()))
-    assert found.force == pytest.approx(2.0 * edge, rel=0.3)
-
-
 # Laws of the noise floor and of the choice of windows.
 #
 # White noise of known size is put into command or reading of an exact motion; what a window passes
