@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile, is_zipfile
 
 import numpy as np
 
 from twin.importers.dialects import Dialect
 from twin.importers.mapping import ImportMap
 from twin.importers.nested import ROWS, flat
-from twin.importers.table import SignalTable, chosen, parsing
+from twin.importers.table import SignalTable, chosen, parsing, require_fits
 
 
 def read(path: Path, mapping: ImportMap) -> SignalTable:
     """Columns of a NumPy file; raises InputError. No objects are unpickled: they may run code."""
     with parsing("NumPy"):
+        if is_zipfile(path):
+            with ZipFile(path) as packed:
+                require_fits(sum(one.file_size for one in packed.infolist()), path)
         loaded = np.load(path, allow_pickle=False)
         arrays = dict(loaded) if isinstance(loaded, np.lib.npyio.NpzFile) else {ROWS: loaded}
         content: dict[str, Any] = {}
