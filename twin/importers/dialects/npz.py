@@ -20,8 +20,9 @@ def read(path: Path, mapping: ImportMap) -> SignalTable:
         if is_zipfile(path):
             with ZipFile(path) as packed:
                 require_fits(sum(one.file_size for one in packed.infolist()), path)
-        loaded = np.load(path, allow_pickle=False)
-        arrays = dict(loaded) if isinstance(loaded, np.lib.npyio.NpzFile) else {ROWS: loaded}
+        with open(path, "rb") as stream:
+            loaded = np.load(stream, allow_pickle=False)
+            arrays = dict(loaded) if isinstance(loaded, np.lib.npyio.NpzFile) else {ROWS: loaded}
         content: dict[str, Any] = {}
         for name, array in arrays.items():
             fields = array.dtype.names or ()
