@@ -210,8 +210,9 @@ def _check_value(effect: Effect, name: str, value: float, units: AxisUnits) -> N
     p = effect.parameter(name)
     unit = units(p.unit)
     if not is_number(value):
+        shown = repr(value) if isinstance(value, str) else str(value)
         raise InputError(
-            f"{effect.name}.{name} = {value!s:.60}: is not a finite number; give it in {unit}"
+            f"{effect.name}.{name} = {shown:.60}: is not a finite number; give it in {unit}"
         )
     if not p.lower <= value <= p.upper:
         raise InputError(

@@ -152,6 +152,16 @@ def test_the_mark_that_editors_of_windows_begin_with_is_no_fault(tmp_path: Path)
     assert load_model(path, CATALOGUE).axes["x"].mass == 2.0
 
 
+def test_a_number_in_quotes_is_shown_in_them(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(
+        'name = "m"\nsample_rate = 1000.0\n[axes.x]\nmass = 2.0\n'
+        '[axes.x.effects.coulomb_viscous]\nFc = "1.0"\nFs = 1.0\nsigma2 = 0.0\n'
+    )
+    with pytest.raises(InputError, match=r"Fc = '1\.0': is not a finite number; give it in N"):
+        load_model(path, CATALOGUE)
+
+
 @pytest.mark.parametrize(
     "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a = 1\na = 2", "\x00", "[axes.x"]
 )
