@@ -34,6 +34,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from twin.entries import Entries, read_entries, toml_document
 from twin.errors import InputError, at
+from twin.importers.table import numbers
 from twin.importers.units import COUNTS, Unit, find_unit
 from twin.logs.container import reading
 from twin.logs.log import FIELDS, LINEAR_UNITS, ROTARY_UNITS, Array
@@ -86,11 +87,12 @@ class TimeMap(_Column):
         """The times (n,) of the columns of its file: in its unit, or dates.
 
         Whole seconds since 1970 and their rest are a date, as a number would lose its digits.
+        Raises InputError where one of two columns is not one of numbers.
         """
-        whole = np.asarray(columns[self.name])
         if self.plus is None:
-            return whole
-        rest = np.asarray(columns[self.plus.name]) * find_unit(self.plus.unit, "s").size
+            return np.asarray(columns[self.name])
+        whole, rest = (numbers(name, columns[name]) for name in self.parts)
+        rest = rest * find_unit(self.plus.unit, "s").size
         if len(whole) and is_calendar(self.seconds * float(whole[0])):
             ns = np.rint(self.seconds * whole).astype(np.int64) * 10**9
             return (ns + np.rint(rest * 1e9).astype(np.int64)).astype("datetime64[ns]")

@@ -451,6 +451,20 @@ def test_whole_seconds_and_the_rest_of_each_in_two_columns(tmp_path, rest, a_sec
     assert abs(int(log.metadata["start_time_unix_ns"]) - (EPOCH * 10**9 + 10**9 // 3)) < 1000
 
 
+def test_a_rest_that_is_no_number_is_refused(tmp_path):
+    path = tmp_path / "a.parquet"
+    table = {"s": [EPOCH] * 3, "ns": ["a", "b", "c"], "q": [1.0, 2.0, 3.0], "f": [1.0, 2.0, 1.0]}
+    pytest.importorskip("pyarrow.parquet").write_table(
+        pytest.importorskip("pyarrow").table(table), path
+    )
+    (tmp_path / "map.toml").write_text(
+        'time = {column = "s", unit = "s", plus = {column = "ns", unit = "ns"}}\n[axes.x]\n'
+        'position = {column = "q", unit = "mm"}\nforce = {column = "f", unit = "N"}\n'
+    )
+    with pytest.raises(InputError, match="column 'ns' does not hold one real number a row"):
+        import_log(path, tmp_path / "map.toml")
+
+
 def test_a_clock_in_seconds_and_the_same_in_milliseconds_are_no_parts(tmp_path):
     body = "\n".join(
         f"{t:.0f},{1e3 * t:.0f},{q:.6g},{f:.6g}" for t, q, f in zip(T, Q, F, strict=True)
