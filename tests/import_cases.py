@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from twin.errors import InputError
 from twin.importers import ImportMap, load_mapping
 from twin.importers.guess import propose
 
@@ -133,3 +134,11 @@ def write_tdms(path: Path, columns: dict[str, np.ndarray], step: float = 1.0 / R
     channels = [nptdms.ChannelObject("run", n, c, period) for n, c in columns.items()]
     with nptdms.TdmsWriter(str(path)) as writer:
         writer.write_segment(channels)
+
+
+def refusal_of(path: Path) -> str:
+    """What is said of a file that is refused, or of which something is asked."""
+    try:
+        return "; ".join(propose(path).lacks({}))
+    except InputError as refused:
+        return str(refused)

@@ -175,9 +175,12 @@ class _Spectra:
         every = np.arange(1, len(self.instrument))
         if self.noise is None:
             return every
-        # Of the largest within an octave, and of all: less is rounding of the setpoint.
+        # Of the largest in its octave and those beside it, and of all: less is rounding.
         near, least, size = 1e-2, 1e-4, np.abs(self.instrument[1:])
-        largest = np.array([size[(k - 1) // 2 : 2 * k].max() for k in every])
+        octave = np.log2(every).astype(int)
+        most = np.maximum.reduceat(size, 2 ** np.arange(octave[-1] + 1) - 1)
+        about = np.pad(most, 1)
+        largest = np.max([about[octave + beside] for beside in range(3)], axis=0)
         return every[size > np.maximum(near * largest, least * size.max())]
 
     @cached_property
@@ -190,9 +193,11 @@ class _Spectra:
         half = max(round(width * centre), UNKNOWNS)
         if self.is_sparse:
             least = UNKNOWNS - 1  # two more than a response has terms; nothing is transient
-            inside = self.lines[np.abs(self.lines - centre) <= half]
-            nearest = np.sort(self.lines[np.argsort(np.abs(self.lines - centre))[:least]])
-            return inside if len(inside) > least else nearest
+            low, here, high = np.searchsorted(self.lines, [centre - half, centre, centre + half])
+            if high - low > least:
+                return self.lines[low:high]
+            about = self.lines[max(here - least, 0) : here + least]
+            return np.sort(about[np.argsort(np.abs(about - centre))[:least]])
         first = max(min(round(centre) - half, len(self.instrument) - 1 - 2 * half), 1)
         return np.arange(first, min(first + 2 * half + 1, len(self.instrument)))
 

@@ -93,7 +93,7 @@ def require_sound(effect: Effect, path: Path) -> None:
         for p in effect.parameters
     ]
     p, s = Guarded("p", values), Guarded("s", [0.0] * len(effect.states))
-    acted = False
+    acted, used = False, set[int]()
     for k, sample in enumerate([*map(_at_speed, SPEEDS), *_anywhere()]):
         usual, io = k < len(SPEEDS), Guarded("io", sample)
         try:
@@ -116,8 +116,8 @@ def require_sound(effect: Effect, path: Path) -> None:
                 f"{path}: its law fails at v = {sample[V]:g} m/s: {told}; use only numbers, "
                 "math functions and the arrays p, s, io"
             ) from error
-        acted = acted or sample != list(io)
-        require_named(effect, path, io.used)
+        acted, used = acted or sample != list(io), used | io.used
+    require_named(effect, path, used)
     if not acted:
         raise InputError(
             f"{path}: its law writes no result; a {effect.kind.name.lower()} effect writes "

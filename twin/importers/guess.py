@@ -17,7 +17,7 @@ from twin.errors import InputError
 from twin.importers.importer import table_of
 from twin.importers.mapping import EVERY_COLUMN, ImportMap
 from twin.importers.nested import recordings_of
-from twin.importers.own_rows import on_one_clock
+from twin.importers.own_rows import on_one_time_base
 from twin.importers.proposal.axes import axes_of
 from twin.importers.proposal.channels import with_channels
 from twin.importers.proposal.courses import columns_of
@@ -147,7 +147,7 @@ def propose(path: Path) -> Proposal:
     with reading(path):
         table = table_of(path, EVERY_COLUMN)
         _require_one_recording(table)
-        one = on_one_clock(table)
+        one = on_one_time_base(table)
         table = table if one is None else one.table
         columns, holes = _distinct(table)
         if not columns:

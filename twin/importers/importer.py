@@ -25,7 +25,7 @@ from twin.importers.dialects import all_dialects, find_dialect
 from twin.importers.mapping import ImportMap, load_mapping
 from twin.importers.own_rows import bridged
 from twin.importers.stamps import with_times
-from twin.importers.stated_rate import StatedRate, stated_rate
+from twin.importers.stated_rate import SAME, StatedRate, stated_rate
 from twin.importers.table import SignalTable, as_numbers, numbers
 from twin.importers.time_base import (
     TimeBase,
@@ -193,8 +193,7 @@ class _Recording:
 
     def _compare(self, stated: StatedRate | None, rate: float, what: str) -> None:
         """Tell where a line of the file states another rate, which may be of another clock."""
-        off = 0.02  # of the rate, by which a clock is not another
-        if stated is not None and stated.rate and abs(stated.rate / rate - 1.0) > off:
+        if stated is not None and stated.rate and abs(stated.rate / rate - 1.0) > SAME:
             self.facts[f"{_NOTE}rate"] = (
                 f"the file states {stated.rate:.6g} Hz ({stated.text!r}), {what} {rate:.6g} Hz"
             )

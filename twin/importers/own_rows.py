@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from twin.errors import InputError, at
+from twin.importers.stated_rate import SLOWEST
 from twin.importers.table import SignalTable, numbers
 from twin.importers.time_base import even_times, require_no_hole, simple_rate
-from twin.importers.time_columns import SLOWEST, Times, candidates, counts
+from twin.importers.time_columns import Times, candidates, counts
 from twin.logs.log import Array
 
 _FEW = 0.1  # of the rows without a number, that a column may have lost
@@ -37,21 +38,21 @@ def bridged(times: Array, columns: Mapping[str, Array]) -> tuple[Array, dict[str
 
 
 @dataclass(frozen=True)
-class OneClock:
+class OnOneTimeBase:
     """A table with all columns on one even clock, and its rate in Hz."""
 
     table: SignalTable
     rate: float
 
 
-def on_one_clock(table: SignalTable) -> OneClock | None:
+def on_one_time_base(table: SignalTable) -> OnOneTimeBase | None:
     """A table as if one clock had recorded it; None where no column has rows of its own."""
     read = _numbers(table)
     own = {name: column for name, column in read.items() if (~np.isfinite(column)).mean() > _FEW}
     whole = {name: column for name, column in read.items() if np.isfinite(column).all()}
-    if not own or (clock := _clock(table, whole)) is None:
+    if not own or (stamps := _times(table, whole)) is None:
         return None
-    seconds = clock.seconds
+    seconds = stamps.seconds
     steps = {n: np.diff(seconds[np.isfinite(column)]) for n, column in own.items()}
     rates = {n: 1.0 / np.median(s) for n, s in steps.items() if len(s) and np.median(s) > 0.0}
     kept = {n: own[n] for n, rate in rates.items() if rate > SLOWEST}
@@ -64,8 +65,9 @@ def on_one_clock(table: SignalTable) -> OneClock | None:
     rate = simple_rate(max(rates[n] for n in kept))
     grid = even_times(times[0], times[-1], rate)
     even = {name: np.interp(grid, times, column) for name, column in columns.items()}
-    even[clock.name] = _as_written(table.columns[clock.name], columns[clock.name], times, grid)
-    return OneClock(replace(table, columns={**_others(table, even), **even}), rate)
+    name = stamps.name
+    even[name] = _as_written(table.columns[name], columns[name], times, grid)
+    return OnOneTimeBase(replace(table, columns={**_others(table, even), **even}), rate)
 
 
 def _numbers(table: SignalTable) -> dict[str, Array]:
@@ -78,7 +80,7 @@ def _numbers(table: SignalTable) -> dict[str, Array]:
     return out
 
 
-def _clock(table: SignalTable, columns: Mapping[str, Array]) -> Times | None:
+def _times(table: SignalTable, columns: Mapping[str, Array]) -> Times | None:
     """The column of the times that all rows have."""
     counters = [name for name, column in columns.items() if counts(name, column)]
     called, _ = candidates(table, columns, counters)

@@ -44,7 +44,8 @@ _EVERY = re.compile(
 _OF_SAMPLES = re.compile(
     rf"{_SAMPLES}|record|logg?|acqui|aufzeichn|\bf_?s\b|\bt_?s\b", re.IGNORECASE
 )
-_SAME = 0.02  # of a rate, by which two that are one do not differ
+SAME = 0.02  # of a rate or a time, by which two clocks that are one do not differ
+SLOWEST = 20.0  # Hz, of a log that a drive is identified from
 _LONGEST = 300  # characters of a line that states a rate
 
 
@@ -83,7 +84,7 @@ def stated_rate(texts: Iterable[str]) -> StatedRate | None:
         return unsure
     first = min(other for other, _ in known)
     rates = [stated for other, stated in known if other is first]
-    if all(abs((r.rate or 0.0) / (rates[0].rate or 1.0) - 1.0) < _SAME for r in rates):
+    if all(abs((r.rate or 0.0) / (rates[0].rate or 1.0) - 1.0) < SAME for r in rates):
         return rates[0]
     texts = [*dict.fromkeys(r.text for r in rates)]
     return StatedRate(None, "; ".join(texts), "and other rates")
@@ -98,8 +99,8 @@ def _kept(text: str) -> int:
 
 def _rate_of(found: re.Match[str]) -> float | None:
     number = float(found["number"].replace(",", "."))
-    slowest = 20.0  # Hz, of a log that a drive is identified from: 1,000 Hz are no 1 Hz
-    if found["rate"] and number < slowest and re.fullmatch(r"\d{1,2},\d{3}", found["number"]):
+    # 1,000 Hz are no 1 Hz
+    if found["rate"] and number < SLOWEST and re.fullmatch(r"\d{1,2},\d{3}", found["number"]):
         number *= 1000.0
     unit = (found["unit"] or found["own"] or "").lower()
     if number <= 0.0:
@@ -109,4 +110,4 @@ def _rate_of(found: re.Match[str]) -> float | None:
     if unit in _PERIODS:
         return 1.0 / (number * _PERIODS[unit])
     rate = number if found["rate"] else 1.0 / number
-    return rate if rate >= slowest else None  # slower is in another unit
+    return rate if rate >= SLOWEST else None  # slower is in another unit

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.errors import InputError
-from twin.importers.stated_rate import StatedRate, stated_rate
-from twin.importers.table import SignalTable, mixed_rows
+from twin.importers.stated_rate import SAME, StatedRate, stated_rate
+from twin.importers.table import SignalTable, key_in_turns, mixed_rows
 from twin.importers.time_base import (
     order_of,
     parts_of,
@@ -29,7 +29,6 @@ from twin.importers.time_columns import Times, candidates, continued, counts, is
 from twin.importers.units import find_unit
 from twin.logs.log import Array
 
-_OFF = 0.02  # of a rate or a time, by which two clocks that are one do not differ
 _BRIDGED = "# resample = ? # Hz: what is lost is bridged by straight lines"
 NOMINAL = 1e-3  # s a sample, where it is not known: what is compared then is the course alone
 
@@ -79,20 +78,14 @@ def find_time_base(table: SignalTable, columns: Mapping[str, Array]) -> StatedTi
 def _are_otherwise(times: Sequence[Times], rate: float) -> bool:
     """Whether even times tell another rate than the one (Hz) that a file states."""
     fine = [one for one in times if not one.is_coarse and _has_rate(one.seconds)]
-    return bool(fine) and all(abs(one.step * rate - 1.0) > _OFF for one in fine)
+    return bool(fine) and all(abs(one.step * rate - 1.0) > SAME for one in fine)
 
 
 def _text_key(table: SignalTable) -> str | None:
-    """That a column of words tells rows of several axes apart, which come in turns."""
-    most, turns = 40, 3  # axes or signals; of how many turns at least
-    for name, raw in table.columns.items():
-        cells = np.asarray(raw)
-        once = [*dict.fromkeys(cells.tolist())] if cells.dtype.kind in "OUS" else []
-        count = len(once)
-        several = 1 < count <= most and len(cells) >= turns * count
-        if several and (cells[count:] == cells[:-count]).all():
-            return mixed_rows(name, [*map(str, once)])
-    return None
+    """That a column of words tells rows of several axes apart, where one does."""
+    texts = {n: c.tolist() for n, c in table.columns.items() if np.asarray(c).dtype.kind in "OUS"}
+    keys = (key_in_turns(name, cells) for name, cells in texts.items())
+    return next((key for key in keys if key is not None), None)
 
 
 def _disagreeing_times(found: Sequence[Times], names: Sequence[str]) -> str | None:
@@ -122,7 +115,7 @@ def _agreeing(
     One whose rate the file states; else the first column of all, where none counts the samples.
     """
     if stated is not None:
-        return [one for one in even if abs(one.step * stated - 1.0) < _OFF][:1]
+        return [one for one in even if abs(one.step * stated - 1.0) < SAME][:1]
     return [one for one in even if one.name == names[0] and not counters]
 
 
@@ -173,7 +166,7 @@ def _of_times(
         lines.append(
             f"resample = {rate:g} # Hz, because the steps are uneven: {spread} {time.unit}"
         )
-    if stated and stated.rate and abs(stated.rate * time.step - 1.0) > _OFF:
+    if stated and stated.rate and abs(stated.rate * time.step - 1.0) > SAME:
         lines.append(f"# the file states {stated.text!r}, its times give {1.0 / time.step:.6g} Hz")
     return StatedTimeBase(tuple(lines), time.step, used, missing)
 
@@ -210,7 +203,7 @@ def _best(found: Sequence[Times]) -> tuple[Times, str]:
     clock = recorded[0]
     for stamp in stamps:
         rising = float((np.diff(stamp.seconds) > 0.0).mean())
-        if rising > 0.9 and abs(stamp.duration / max(clock.duration, 1e-9) - 1.0) < _OFF:
+        if rising > 0.9 and abs(stamp.duration / max(clock.duration, 1e-9) - 1.0) < SAME:
             return stamp, ""
     what = f"take {stamps[0].duration:.4g} s" if stamps[0].duration > 0.0 else "stand still"
     return clock, f"; the times of {stamps[0].name} {what}, these {clock.duration:.4g} s"

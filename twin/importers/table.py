@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from io import BytesIO
+from operator import eq
 from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO
@@ -181,6 +182,19 @@ def notes_of(entries: Mapping[str, object]) -> list[str]:
         for key, value in entries.items()
         if np.size(np.asarray(value, dtype=object)) == 1
     ]
+
+
+def key_in_turns(name: str, cells: Sequence[str]) -> str | None:
+    """That a column of words tells rows of several axes or signals apart, where it does.
+
+    Its words come again and again in one order, and are not the two of a heartbeat.
+    """
+    turns, flags = 3, {"true", "false", "on", "off", "yes", "no"}  # of how many turns at least
+    words = [*dict.fromkeys(cells)]
+    count = len(words)
+    again = 1 < count <= len(cells) // turns and all(map(eq, cells[count:], cells))
+    heartbeat = {str(word).lower() for word in words} <= flags
+    return mixed_rows(name, [*map(str, words)]) if again and not heartbeat else None
 
 
 def mixed_rows(name: str, values: Sequence[str]) -> str:

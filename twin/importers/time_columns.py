@@ -12,6 +12,7 @@ import numpy as np
 from twin.errors import InputError
 from twin.importers.counters import find_wraps, unwrapped
 from twin.importers.proposal.names import units_of
+from twin.importers.stated_rate import SLOWEST
 from twin.importers.table import SignalTable
 from twin.importers.time_base import rows_a_stamp, times_of
 from twin.importers.units import find_unit, is_unit
@@ -39,7 +40,7 @@ _EPOCHS = (
     (1.25e17, 1.45e17, "100ns", "100 ns since 1601"),
     (6.3e17, 6.51e17, "100ns", "100 ns since the year 1"),
 )
-SLOWEST, _FASTEST = 20.0, 100_000.0  # Hz, of a log that a drive is identified from
+_FASTEST = 100_000.0  # Hz, of a log that a drive is identified from
 _SIZES = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
@@ -75,12 +76,8 @@ class Times:
     @property
     def entry(self) -> str:
         """Its entry in a map."""
-        column = _entry(self.name, self.unit)
-        return (
-            f"{{{column}}}"
-            if self.rest is None
-            else f"{{{column}, plus = {{{_entry(*self.rest)}}}}}"
-        )
+        rest = "" if self.rest is None else f", plus = {{{_entry(*self.rest)}}}"
+        return f"{{{_entry(self.name, self.unit)}{rest}}}"
 
     @property
     def columns(self) -> tuple[str, ...]:

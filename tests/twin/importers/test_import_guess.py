@@ -15,7 +15,6 @@ from twin.checks import Fault, check_log
 from twin.checks.content import assumptions
 from twin.errors import InputError
 from twin.importers import import_log
-from twin.importers.mapping import parse_mapping
 from twin.logs import read_log, write_log
 from twin.model.file import save_model
 from twin.model.machine import AxisModel, MachineModel
@@ -455,50 +454,3 @@ def test_an_error_beside_a_measured_position_makes_no_other(tmp_path: Path) -> N
     write_csv(tmp_path / "a.csv", {**columns, "force [N]": PUSH})
     found = columns_of(guess_map(tmp_path / "a.csv").text)["x"]
     assert (found["position"], found["setpoint_position"]) == ("pos [mm]", "ref_pos [mm]")
-
-
-@pytest.mark.parametrize(
-    ("speed", "size", "kind"),
-    [("Speed [mm/s]", 1e3, "linear"), ("n act [rpm]", 30.0 / np.pi, "rotary")],
-)
-def test_the_position_of_a_velocity_alone_is_its_integral(tmp_path, speed, size, kind):
-    force = "Force [N]" if kind == "linear" else "Torque [Nm]"
-    asked = {"Speed setpoint": size * (V + 1e-3 * NOISE)} if kind == "rotary" else {}
-    path = tmp_path / "a.csv"
-    write_csv(path, {"t [s]": T, speed: size * V, **asked, force: F})
-    text = guess_map(path).text
-    (entry,) = tomllib.loads(text)["axes"].values()
-    assert entry["position"]["column"] == entry["velocity"]["column"] == speed
-    assert entry["position"]["integrated"]
-    assert "of a velocity, as no position is recorded" in text
-    (axis,) = import_log(path, mapping(tmp_path, text)).axes.values()
-    assert axis.kind.kind == kind
-    np.testing.assert_allclose(axis.position, Q - Q[0], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("field", "unit", "message"),
-    [
-        ("force", "N", "integrated: of a velocity a position is made, no force"),
-        ("position", "mm", "unit 'mm' is not known here"),
-        ("position", "counts/s", "to be integrated it must be one of a velocity"),
-    ],
-)
-def test_only_a_velocity_is_integrated_to_a_position(tmp_path, field, unit, message):
-    entries = {"position": '{column = "q", unit = "m"}', "force": '{column = "f", unit = "N"}'}
-    entries[field] = f'{{column = "q", unit = "{unit}", integrated = true}}'
-    lines = "\n".join(f"{name} = {entry}" for name, entry in entries.items())
-    with pytest.raises(InputError, match=message):
-        parse_mapping(f"sample_rate = 1000\n[axes.x]\n{lines}\n")
-
-
-def test_parts_of_a_command_are_no_force(tmp_path):
-    path = tmp_path / "a.csv"
-    write_csv(path, {"t": T, "q": Q, "tau_ff": 0.9 * F, "tau_pid": 0.1 * F + 1e-2 * NOISE})
-    found = guess_map(path)
-    assert list(columns_of(found.text)) == ["x"]
-    assert list(columns_of(found.text)["x"]) == ["position"]
-    assert "not used: tau_ff, tau_pid: a part of the command, by its name" in found.text
-    assert any("looks like a force" in lack for lack in found.missing)
-    write_csv(path, {"t": T, "q": Q, "PID torque": F})  # which may be all there is
-    assert "that it is all of the force ASSUMED" in guess_map(path).text

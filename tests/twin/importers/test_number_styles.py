@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from import_cases import refusal_of
 
 from twin.errors import InputError
 from twin.importers import import_log
@@ -107,14 +108,6 @@ def test_rows_of_several_axes_or_signals_are_no_samples(
     path = tmp_path / "table.csv"
     path.write_text("\n".join([head, *body]))
     assert re.search(told, refusal_of(path))
-
-
-def refusal_of(path: Path) -> str:
-    """What is said against a file, as it is read or as a map is proposed."""
-    try:
-        return " ".join(propose(path).lacks({}))
-    except InputError as refused:
-        return str(refused)
 
 
 def test_a_heartbeat_tells_no_rows_apart(tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from import_cases import refusal_of
 from scipy.io import savemat
 
-from twin.errors import InputError
 from twin.importers import import_log
 from twin.importers.guess import propose
 from twin.importers.mapping import parse_mapping
@@ -23,14 +23,6 @@ T = np.arange(COUNT) / RATE
 Q = 0.05 * np.sin(9.0 * T) + 0.02 * np.sin(23.0 * T)  # m
 V = 0.45 * np.cos(9.0 * T) + 0.46 * np.cos(23.0 * T)
 F = 12.0 * np.gradient(V, T) + 6.0 * np.sign(V) + 25.0 * V  # N, of 12 kg
-
-
-def refusal(path: Path) -> str:
-    """What is said of a file that is refused, or of which something is asked."""
-    try:
-        return "; ".join(propose(path).lacks({}))
-    except InputError as error:
-        return str(error)
 
 
 def imported(path: Path) -> Log:
@@ -195,6 +187,10 @@ def rate_in_kilohertz(path: Path) -> Path:
     return path
 
 
+def heartbeat(path: Path) -> Path:
+    return parquet(path, {**SIGNALS, "alive": ["on", "off"] * (COUNT // 2)})
+
+
 @pytest.mark.parametrize(
     ("name", "write"),
     [
@@ -203,6 +199,7 @@ def rate_in_kilohertz(path: Path) -> Path:
         ("a.json", rate_in_kilohertz), ("a.jsonl", batches),
         ("a.mat", mat73), ("a.feather", arrow), ("a.npy", records_of_numpy), ("a.npz", archive),
         ("a.parquet", decimals), ("a.parquet", structs), ("a.json", of_pandas),
+        ("a.parquet", heartbeat),
         ("a.jsonl", numbers_as_text),
     ],
     ids=lambda one: getattr(one, "__name__", str(one)),
@@ -219,7 +216,7 @@ def test_a_last_line_that_is_cut_off_is_left_out(tmp_path: Path) -> None:
     broken = path.read_text().splitlines()
     broken[7] = broken[7][:-3]
     path.write_text("\n".join(broken))
-    assert "line 8 is no JSON" in refusal(path)
+    assert "line 8 is no JSON" in refusal_of(path)
 
 
 def test_a_channel_of_tdms_that_is_left_at_a_second_a_sample_states_no_rate(tmp_path: Path) -> None:
@@ -288,4 +285,4 @@ def holed(path: Path) -> Path:
 def test_what_is_not_known_is_asked_for(
     tmp_path: Path, name: str, write: Callable[[Path], Path], said: str
 ) -> None:
-    assert said in refusal(write(tmp_path / name))
+    assert said in refusal_of(write(tmp_path / name))

@@ -20,14 +20,13 @@ from twin.importers.mapping import ImportMap
 from twin.importers.proposal.names import units_of
 from twin.importers.stamps import is_date, is_stamp
 from twin.importers.style import Style
-from twin.importers.table import SignalTable, mixed_rows, parsing
+from twin.importers.table import SignalTable, key_in_turns, parsing
 from twin.importers.text import ENDINGS, Head, Layout, read_table
 from twin.importers.units import is_unit, is_usual_unit, raw_unit
 from twin.logs.log import LINEAR_UNITS, ROTARY_UNITS
 
 _UNITS_OF = ("s", *LINEAR_UNITS.values(), *ROTARY_UNITS.values())
 _WITHOUT_CELLS = 2  # names at the end, such as LabVIEW's comment, that rows may have no cell of
-_FLAGS = {"true", "false", "on", "off", "yes", "no"}  # of a heartbeat
 _SOME = 40  # rows by which the kinds of the columns are told
 
 Rows = Sequence[Sequence[str]]
@@ -64,7 +63,7 @@ def find_layout(head: Head, stated: ImportMap) -> Layout:
     several = given[0] != width and (given[1] == width or given[0] < width)  # words a name
     named = spaced if several else rows
     groups = named[header - 1] if header > 0 else ()
-    names = _told_apart(_names(named[header], rows[skip]), groups)
+    names = _each_once(_names(named[header], rows[skip]), groups)
     units = _units(rows[header + 1 : skip], names)
     _require_samples(names, rows[skip : skip + _SOME], style)
     return Layout(head.encoding, style, names, skip, some, units, header)
@@ -188,12 +187,9 @@ def _is_usual(cell: str) -> bool:
 def _require_samples(names: Sequence[str], rows: Rows, style: Style) -> None:
     """Raise InputError where a column goes through the same words again and again."""
     for name, cells in zip(names, zip(*rows, strict=False), strict=False):
-        once = [*dict.fromkeys(cells)]
-        times, count = 3, len(once)  # that all of them must have come
-        again = count > 1 and len(cells) >= times * count and cells[count:] == cells[:-count]
-        words = {c.lower() for c in once if c and not style.is_number(c) and not is_stamp(c)}
-        if again and len(words) == count and not words <= _FLAGS:
-            raise InputError(mixed_rows(name, once))
+        words = all(c and not style.is_number(c) and not is_stamp(c) for c in {*cells})
+        if words and (key := key_in_turns(name, cells)) is not None:
+            raise InputError(key)
 
 
 def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
@@ -206,7 +202,7 @@ def _names(header: Sequence[str], row: Sequence[str]) -> tuple[str, ...]:
     return tuple(name or str(k + 1) for k, name in enumerate(names))
 
 
-def _told_apart(names: Sequence[str], groups: Sequence[str]) -> tuple[str, ...]:
+def _each_once(names: Sequence[str], groups: Sequence[str]) -> tuple[str, ...]:
     """Names of which each is there once: by the groups of columns above them, else by a number.
 
     groups: the cells of the line above, each the name of its column and of those behind it that
